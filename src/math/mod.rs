@@ -1,0 +1,9 @@
+//! Frames, warps with their inverses, discrete and tabulated distributions, random numbers.
+
+pub mod distribution;
+pub mod frame;
+pub mod random;
+pub mod warp;
+
+pub use frame::Frame;
+pub use random::Random;
