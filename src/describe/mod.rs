@@ -266,7 +266,8 @@ pub struct BsdfDescription {
     pub place: Place,
 }
 
-/// The local models with their parameters, named as Mitsuba 3 names them.
+/// The local models with their parameters, named as Mitsuba 3 names them (its manual defines each).
+#[allow(missing_docs)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum BsdfModel {
     /// Lambert.
