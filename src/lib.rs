@@ -8,8 +8,9 @@
 //! - [`math`]: frames, warps, distributions, random numbers.
 //! - [`spectrum`]: what a colour is.
 //! - [`describe`]: the scene as plain data, every value with its place in the file.
+//! - [`texture`]: numbers that vary over a surface.
 //! - [`local`]: local models `f(w_i, w_o)`, no coupling between points.
-//! - [`scene`]: the built, immutable scene: geometry, emitters `Lᵉ`, sensors `Wᵉ`, textures.
+//! - [`scene`]: the built, immutable scene: geometry, emitters `Lᵉ`, sensors `Wᵉ`.
 //! - [`transport`]: the walks and the measurement.
 //! - [`film`]: exact accumulation into images.
 //! - [`io`]: one file per format.
@@ -25,4 +26,5 @@ pub mod math;
 pub mod report;
 pub mod scene;
 pub mod spectrum;
+pub mod texture;
 pub mod transport;

@@ -84,6 +84,18 @@ impl Spectrum {
         Self::rgb(f(self.0.x), f(self.0.y), f(self.0.z))
     }
 
+    /// The larger of the two in every lane.
+    #[inline]
+    pub fn lane_max(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
+    }
+
+    /// The smaller of the two in every lane.
+    #[inline]
+    pub fn lane_min(self, other: Self) -> Self {
+        Self(self.0.min(other.0))
+    }
+
     /// Linear blend: `self` at 0, `other` at 1.
     #[inline]
     pub fn lerp(self, other: Self, t: f32) -> Self {

@@ -3,7 +3,6 @@
 //! - `geometry`: shapes, ray casting h(x, ω), surface points.
 //! - `emitter`: emission Lᵉ: evaluated, sampled for shooting, sampled for next events.
 //! - `sensor`: the measurement Wᵉ of a pixel: rays out, points projected back.
-//! - `texture`: numbers that vary over a surface.
 
 use glam::{Vec2, Vec3};
 
