@@ -1,1 +1,28 @@
-//! (being built)
+//! Comparison of two images: how far apart they are, and whether chance explains it.
+//!
+//! - [`measures`]: RMSE, relMSE plain and trimmed, ratio of means.
+//! - [`flip`]: what an eye flipping between the two would see.
+//! - [`welch`]: whether two estimates with known variance have the same expectation.
+//! - [`comparison`]: all of them, as text and as JSON.
+
+pub mod comparison;
+pub mod flip;
+pub mod measures;
+pub mod welch;
+
+pub use comparison::{Comparison, compare};
+
+/// An image with what is known of its error.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Linear sRGB, row by row from the top.
+    pub mean: Vec<[f32; 3]>,
+    /// Variance of each number of `mean`.
+    pub variance: Option<Vec<[f32; 3]>>,
+    /// Independent samples that each number of `mean` is the mean of.
+    pub samples: Option<u64>,
+}
