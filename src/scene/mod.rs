@@ -4,11 +4,8 @@
 //! - `emitter`: emission Lᵉ: evaluated, sampled for shooting, sampled for next events.
 //! - `sensor`: the measurement Wᵉ of a pixel: rays out, points projected back.
 
+pub use crate::local::MaterialId;
 use glam::{Vec2, Vec3};
-
-/// Index of a built local model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MaterialId(pub u32);
 
 /// Index of a built emitter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
