@@ -4,6 +4,8 @@
 //! - `emitter`: emission Lᵉ: evaluated, sampled for shooting, sampled for next events.
 //! - `sensor`: the measurement Wᵉ of a pixel: rays out, points projected back.
 
+pub mod geometry;
+
 pub use crate::local::MaterialId;
 use glam::{Vec2, Vec3};
 
