@@ -4,9 +4,11 @@
 //! names by decoded meshes and images; `scene::Scene::build` turns it into the immutable scene.
 //! A scene built in code fills the same types with default places.
 
+mod mesh;
 mod place;
 mod problem;
 
+pub use mesh::smooth_normals;
 pub use place::{Place, Placed, SourceFile, Sources};
 pub use problem::{Problem, Problems, Severity};
 
@@ -496,7 +498,7 @@ pub enum MeshDescription {
 }
 
 /// Formats of mesh files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MeshFormat {
     /// Wavefront OBJ.
     Obj,

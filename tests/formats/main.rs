@@ -1,0 +1,11 @@
+//! Files in and out: every format read and written from small files made here, and what broken
+//! files get.
+
+mod broken;
+mod decode;
+mod exr;
+mod images;
+mod obj;
+mod ply;
+mod serialized;
+mod write;
