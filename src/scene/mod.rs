@@ -5,6 +5,7 @@
 //! - `sensor`: the measurement Wᵉ of a pixel: rays out, points projected back.
 
 pub mod geometry;
+pub mod sensor;
 
 pub use crate::local::MaterialId;
 use glam::{Vec2, Vec3};
