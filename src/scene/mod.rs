@@ -4,6 +4,7 @@
 //! - `emitter`: emission Lᵉ: evaluated, sampled for shooting, sampled for next events.
 //! - `sensor`: the measurement Wᵉ of a pixel: rays out, points projected back.
 
+pub mod emitter;
 pub mod geometry;
 pub mod sensor;
 
