@@ -6,6 +6,7 @@
 
 pub mod emitter;
 pub mod geometry;
+mod rigid;
 pub mod sensor;
 
 pub use crate::local::MaterialId;

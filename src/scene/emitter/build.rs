@@ -14,9 +14,10 @@ use crate::describe::{
 };
 use crate::scene::EmitterId;
 use crate::scene::geometry::Geometry;
+use crate::scene::rigid;
 use crate::spectrum::Spectrum;
 use crate::texture::{TextureSlot, Textures};
-use glam::{DMat3, Mat3, Mat4, Vec3};
+use glam::{Mat4, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -88,7 +89,7 @@ impl Lights {
         if !power.is_finite() || power.0.min_element() < 0.0 {
             problems.error(place, format!("the {kind} emitter's power is negative or not finite")).hint("check its numbers");
             share = 0.0;
-        } else if !(share > 0.0) && !matches!(emitter, Emitter::Dark) {
+        } else if share == 0.0 && !matches!(emitter, Emitter::Dark) {
             problems.warning(place, format!("the {kind} emitter is black and has no effect"));
         }
         let emitter = if share > 0.0 { emitter } else { Emitter::Dark };
@@ -190,7 +191,7 @@ impl Lights {
             problems.error(place, "the projected image is negative or not finite");
             return None;
         }
-        let axes = axes(to_world, problems)?;
+        let (axes, _) = rigid::axes(to_world, "emitter", problems)?;
         let position = to_world.value.w_axis.truncate();
         let (cutoff_deg, beam_deg) = (f64::from(*cutoff), f64::from(*beam));
         let spot = Spot::new(Parameters { axes, position, intensity, cutoff_deg, beam_deg, texture });
@@ -280,7 +281,7 @@ fn envmap(
         problems.error(place, format!("the envmap emitter's scale of {scale} is negative or not finite"));
         return None;
     }
-    let axes = axes(to_world, problems)?;
+    let (axes, _) = rigid::axes(to_world, "emitter", problems)?;
     let image = sanitised(image, place, problems);
     Some(Envmap::new(image, scale, axes).map_or(Sky::Constant(Spectrum::BLACK), |map| Sky::Envmap(Box::new(map))))
 }
@@ -300,27 +301,6 @@ fn sanitised(image: &Arc<Image>, place: Place, problems: &mut Problems) -> Arc<I
     let mut copy = Image::clone(image);
     copy.data.iter_mut().filter(|v| !sound(v)).for_each(|v| *v = 0.0);
     Arc::new(copy)
-}
-
-/// Orthonormal axes of a transform that rotates, mirrors, moves and scales uniformly.
-fn axes(to_world: &Placed<Mat4>, problems: &mut Problems) -> Option<Mat3> {
-    let linear = DMat3::from_mat4(to_world.value.as_dmat4());
-    let scale = linear.determinant().abs().cbrt();
-    if !to_world.value.is_finite() || !(scale > 0.0) {
-        problems.error(to_world.place, "the emitter's transform is not invertible");
-        return None;
-    }
-    let m = linear * (1.0 / scale);
-    if (m.transpose() * m - DMat3::IDENTITY).to_cols_array().iter().any(|e| e.abs() > 1e-3) {
-        problems
-            .error(to_world.place, "the emitter's transform scales its axes differently or shears them")
-            .hint("rotations, reflections, translations and uniform scales keep angles");
-        return None;
-    }
-    let z = m.z_axis.normalize();
-    let y = (m.y_axis - z * z.dot(m.y_axis)).normalize();
-    let x = (m.x_axis - z * z.dot(m.x_axis) - y * y.dot(m.x_axis)).normalize();
-    Some(DMat3::from_cols(x, y, z).as_mat3())
 }
 
 fn finite_texture(textures: &Textures, slot: TextureSlot) -> bool {

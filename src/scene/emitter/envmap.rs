@@ -92,7 +92,7 @@ impl Envmap {
             map.columns.push(Discrete::new(weights.iter().map(|w| share(w) + UNIFORM / width as f64))?);
         }
         let total: f64 = masses.iter().sum();
-        if !(total > 0.0) {
+        if total <= 0.0 {
             return None;
         }
         let share = |(m, h): (&f64, &f64)| (1.0 - UNIFORM) * m / total + UNIFORM * 0.5 * h;

@@ -61,7 +61,7 @@ impl Lights {
             }
             Emitter::Sky(sky) => {
                 let (w, p_w, radiance) = sky.sample(u);
-                if !(p_w > 0.0) || radiance.is_black() {
+                if p_w <= 0.0 || radiance.is_black() {
                     return None;
                 }
                 let emission = EmissionDensity { p_k: prob_emission * p_w, p_next: self.p_across };
@@ -140,7 +140,7 @@ impl Lights {
                 let density = EmissionDensity { p_k: prob * area.p_a, p_next: warp::hemisphere_cosine_p_w(local.z) };
                 // Lᵉ·cosθ / (p_k·p_next), in which the cosine cancels.
                 let weight = self.textures.eval(area.radiance, s.uv) * (PI / density.p_k);
-                if !(local.z > 0.0) || weight.is_black() {
+                if local.z <= 0.0 || weight.is_black() {
                     return None;
                 }
                 let point = EmitterPoint { emitter, y: s.p, y_error: s.p_error, n_g: s.n_g, uv: s.uv };
@@ -148,39 +148,24 @@ impl Lights {
             }
             Emitter::Point(p) => {
                 let w = warp::sphere_uniform(u_direction);
-                self.from_point(emitter, p.position, w, p.intensity, warp::SPHERE_UNIFORM_P_W, prob)
+                emit_from_point(emitter, p.position, w, p.intensity, warp::SPHERE_UNIFORM_P_W, prob)
             }
             Emitter::Spot(s) => {
                 let (w, p_w) = s.sample(u_direction);
-                self.from_point(emitter, s.position, w, s.intensity(&self.textures, w), p_w, prob)
+                emit_from_point(emitter, s.position, w, s.intensity(&self.textures, w), p_w, prob)
             }
-            Emitter::Parallel(p) => self.from_infinity(emitter, p.direction, p.irradiance, prob, u_position, true),
+            Emitter::Parallel(p) => self.emit_from_infinity(emitter, p.direction, p.irradiance, prob, u_position, true),
             Emitter::Sky(sky) => {
                 let (w, p_w, radiance) = sky.sample(u_direction);
-                self.from_infinity(emitter, -w, radiance, prob * p_w, u_position, false)
+                self.emit_from_infinity(emitter, -w, radiance, prob * p_w, u_position, false)
             }
             Emitter::Dark => None,
         }
     }
 
-    #[inline]
-    fn from_point(&self, emitter: EmitterId, y: Vec3, w: Vec3, intensity: Spectrum, p_w: f32, prob: f32) -> Option<Emission> {
-        if !(p_w > 0.0) || intensity.is_black() {
-            return None;
-        }
-        Some(Emission {
-            point: EmitterPoint { emitter, y, y_error: 0.0, n_g: Vec3::ZERO, uv: Vec2::ZERO },
-            w,
-            weight: intensity * (1.0 / (prob * p_w)),
-            density: EmissionDensity { p_k: prob, p_next: p_w },
-            delta: true,
-            infinite: false,
-        })
-    }
-
     /// Starts on the disk behind the scene's sphere, across the direction of travel `w`.
     #[inline]
-    fn from_infinity(
+    fn emit_from_infinity(
         &self,
         emitter: EmitterId,
         w: Vec3,
@@ -189,7 +174,7 @@ impl Lights {
         u_position: Vec2,
         delta: bool,
     ) -> Option<Emission> {
-        if !(p_k > 0.0) || radiance.is_black() {
+        if p_k <= 0.0 || radiance.is_black() {
             return None;
         }
         let at = warp::disk_concentric(u_position) * self.radius;
@@ -321,4 +306,19 @@ fn toward(x: Vec3, y: Vec3) -> Option<(Vec3, f32, f32)> {
     }
     let d = d2.sqrt();
     Some((v / d, d, 1.0 / d2))
+}
+
+#[inline]
+fn emit_from_point(emitter: EmitterId, y: Vec3, w: Vec3, intensity: Spectrum, p_w: f32, prob: f32) -> Option<Emission> {
+    if p_w <= 0.0 || intensity.is_black() {
+        return None;
+    }
+    Some(Emission {
+        point: EmitterPoint { emitter, y, y_error: 0.0, n_g: Vec3::ZERO, uv: Vec2::ZERO },
+        w,
+        weight: intensity * (1.0 / (prob * p_w)),
+        density: EmissionDensity { p_k: prob, p_next: p_w },
+        delta: true,
+        infinite: false,
+    })
 }

@@ -39,7 +39,7 @@ impl Orthographic {
         let basis = DMat3::from_cols(step_x, step_y, axis.normalize_or_zero());
         let inverse = basis.inverse();
         let area = basis.determinant().abs();
-        if !matrix.is_finite() || !inverse.is_finite() || !(area > 0.0) {
+        if !matrix.is_finite() || !inverse.is_finite() || area == 0.0 {
             problems.error(description.to_world.place, "the sensor's transform is not invertible");
             return None;
         }

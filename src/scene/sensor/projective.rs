@@ -8,7 +8,8 @@
 use super::{SensorConnection, SensorRay};
 use crate::describe::{FovAxis, Problems, SensorDescription, SensorModel};
 use crate::math::warp::disk_concentric;
-use glam::{DMat3, Mat3, Vec2, Vec3};
+use crate::scene::rigid;
+use glam::{Mat3, Vec2, Vec3};
 
 #[derive(Clone, Debug)]
 pub(super) struct Projective {
@@ -94,7 +95,12 @@ impl Projective {
             problems.error(place, format!("the focus distance {} is not positive and finite", optics.focus_distance));
             return None;
         }
-        let (axes, origin) = rigid(description, problems)?;
+        let (axes, scale) = rigid::axes(&description.to_world, "sensor", problems)?;
+        if (scale - 1.0).abs() > 1e-3 {
+            let what = format!("the sensor's transform scales by {scale:.4}; the scale has no effect here");
+            problems.warning(description.to_world.place, what);
+        }
+        let origin = description.to_world.value.w_axis.truncate();
         let size = Vec2::new(description.film.width as f32, description.film.height as f32);
         let aspect = f64::from(description.film.width) / f64::from(description.film.height);
         let pixel = 2.0 * tan_half_x(f64::from(optics.fov_deg), optics.fov_axis, aspect) / f64::from(description.film.width);
@@ -186,33 +192,4 @@ impl Projective {
         let end = self.origin + self.axes * lens + d * (self.near / cos);
         Some(SensorConnection { raster: self.raster(lens, q), w: w_travel, inv_d2: 1.0, end, g_dir: self.g_dir(cos) })
     }
-}
-
-/// The transform as orthonormal axes and an origin; scaling is ignored with a warning, anything
-/// that bends right angles is an error.
-fn rigid(description: &SensorDescription, problems: &mut Problems) -> Option<(Mat3, Vec3)> {
-    let place = description.to_world.place;
-    let matrix = description.to_world.value.as_dmat4();
-    let linear = DMat3::from_mat4(matrix);
-    let scale = linear.determinant().abs().cbrt();
-    let orthogonal = linear * (1.0 / scale);
-    let bent = (orthogonal.transpose() * orthogonal - DMat3::IDENTITY).to_cols_array().iter().any(|e| !(e.abs() < 1e-3));
-    if !matrix.is_finite() || !(scale > 0.0) {
-        problems.error(place, "the sensor's transform is not invertible");
-        return None;
-    }
-    if bent {
-        problems
-            .error(place, "the sensor's transform scales its axes differently or shears them")
-            .hint("a perspective sensor can be rotated and moved only");
-        return None;
-    }
-    if (scale - 1.0).abs() > 1e-3 {
-        problems.warning(place, format!("the sensor's transform scales by {scale:.4}; the scale has no effect here"));
-    }
-    // Gram–Schmidt from the viewing direction, so that rounding in the file does not matter.
-    let z = orthogonal.z_axis.normalize();
-    let y = (orthogonal.y_axis - z * z.dot(orthogonal.y_axis)).normalize();
-    let x = (orthogonal.x_axis - z * z.dot(orthogonal.x_axis) - y * y.dot(orthogonal.x_axis)).normalize();
-    Some((DMat3::from_cols(x, y, z).as_mat3(), matrix.w_axis.truncate().as_vec3()))
 }
