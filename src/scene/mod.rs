@@ -4,13 +4,59 @@
 //! - `emitter`: emission Lᵉ: evaluated, sampled for shooting, sampled for next events.
 //! - `sensor`: the measurement Wᵉ of a pixel: rays out, points projected back.
 
+mod build;
 pub mod emitter;
 pub mod geometry;
+mod hash;
 mod rigid;
 pub mod sensor;
+#[cfg(test)]
+mod tests;
 
 pub use crate::local::MaterialId;
+pub use build::SceneInfo;
+
+use crate::describe::{FilmDescription, IntegratorDescription};
+use crate::local::Materials;
+use emitter::Lights;
+use geometry::Geometry;
 use glam::{Vec2, Vec3};
+use sensor::Sensor;
+
+/// Everything that is measured, seen by one sensor. Immutable, shared by all threads.
+pub struct Scene {
+    /// Shapes: h(x, ω), surface points, visibility.
+    pub geometry: Geometry,
+    /// Local models f(w_i, w_o) with their textures.
+    pub materials: Materials,
+    /// Emission Lᵉ with its textures.
+    pub lights: Lights,
+    /// The measurement Wᵉ.
+    pub sensor: Sensor,
+    /// Size, crop window and filter of the image.
+    pub film: FilmDescription,
+    /// What the integrator element asks for.
+    pub integrator: IntegratorDescription,
+    /// Samples per pixel that the scene asks for.
+    pub sample_count: Option<u32>,
+    /// Seed that the scene asks for.
+    pub seed: u64,
+    hash: [u8; 32],
+    image_bytes: usize,
+}
+
+impl Scene {
+    /// Identity of what is rendered: equal for equal content, wherever its files are and whatever its
+    /// elements are called.
+    pub fn hash(&self) -> [u8; 32] {
+        self.hash
+    }
+
+    /// [`Self::hash`] in hexadecimal digits.
+    pub fn hash_hex(&self) -> String {
+        blake3::Hash::from_bytes(self.hash).to_hex().to_string()
+    }
+}
 
 /// Index of a built emitter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
