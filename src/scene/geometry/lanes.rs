@@ -34,8 +34,6 @@ pub(super) trait Lanes: Copy {
     fn min(self, b: Self) -> Self;
     /// The larger; b where either is not a number.
     fn max(self, b: Self) -> Self;
-    /// |a|.
-    fn abs(self) -> Self;
     /// a ≤ b, false for what is not a number.
     fn le(self, b: Self) -> Self::Mask;
     /// a < b, false for what is not a number.
@@ -128,11 +126,6 @@ impl Lanes for Portable {
     #[inline(always)]
     fn max(self, b: Self) -> Self {
         self.zip(b, |a, b| if a > b { a } else { b })
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.map(f32::abs))
     }
 
     #[inline(always)]

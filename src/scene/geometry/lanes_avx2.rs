@@ -108,11 +108,6 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn abs(self) -> Self {
-        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
-    }
-
-    #[inline(always)]
     fn le(self, b: Self) -> __m256 {
         unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, b.0) }
     }

@@ -24,6 +24,10 @@ mod sphere;
 mod surface;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_mitsuba;
+#[cfg(test)]
+mod tests_robust;
 mod traverse;
 mod tree;
 mod triangle;

@@ -47,11 +47,13 @@ impl Node {
         Self { planes: [lo, hi, lo, hi, lo, hi], child: [EMPTY; 8], pad: [0; 8] }
     };
 
-    /// Sets child `k`.
+    /// Sets child `k`, its box widened by the rounding that triangles of such coordinates undergo in
+    /// traversal: 8 unit roundoffs, and two for this addition.
     pub(super) fn set(&mut self, k: usize, bounds: &Aabb, code: u32) {
+        let slack = 5.0 * f32::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
         for axis in 0..3 {
-            self.planes[2 * axis][k] = bounds.min[axis];
-            self.planes[2 * axis + 1][k] = bounds.max[axis];
+            self.planes[2 * axis][k] = bounds.min[axis] - slack;
+            self.planes[2 * axis + 1][k] = bounds.max[axis] + slack;
         }
         self.child[k] = code;
     }
