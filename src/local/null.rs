@@ -1,7 +1,6 @@
 //! Straight through, as if there were no surface: f is a Dirac function of w_next = −w_back.
 //!
-//! It marks a boundary that is not one for light [Veach 1997, §5.2 treats such passing Dirac
-//! functions as BSDF]. Mitsuba 3 counts it as an event, and so does nephroid.
+//! It marks a boundary that is none for light. It counts as an event of a path, as in [Mitsuba 3].
 //!
 //! ```xml
 //! <bsdf type="null"/>

@@ -2,9 +2,9 @@
 //!
 //! Base: f = (ρ/π) (1 − F_i)(1 − F_o) / (η² (1 − ρ' F_int)), where F_int is what the coat sends back
 //! inside on average and ρ' is ρ (`nonlinear`) or 1 (colour is kept): all orders of light between
-//! base and coat summed [Ashikhmin & Shirley 2000 have the same (1 − F_i)(1 − F_o); the series is
-//! that of Mitsuba 3]. Coat or base is chosen by F and by the means of the two reflectances.
-//! Black on the inside.
+//! base and coat summed. The product (1 − F_i)(1 − F_o) is that of the coupled model of
+//! [Shirley 1997], the series that of [Mitsuba 3]. Coat or base is chosen by F and by the means of
+//! the two reflectances. Black on the inside.
 //!
 //! ```xml
 //! <bsdf type="plastic">
