@@ -253,7 +253,7 @@ impl Lights {
         }
     }
 
-    /// Something can be lit.
+    /// Nothing shines.
     pub fn is_empty(&self) -> bool {
         self.choice.is_none()
     }

@@ -34,10 +34,7 @@ impl Sky {
         match self {
             Self::Constant(l) => (warp::sphere_uniform(u), warp::SPHERE_UNIFORM_P_W, *l),
             Self::Sun(s) => s.sample(u),
-            Self::Envmap(e) => {
-                let (w, p_w) = e.sample(u);
-                (w, p_w, e.radiance(w))
-            }
+            Self::Envmap(e) => e.sample(u),
         }
     }
 

@@ -124,7 +124,13 @@ fn environment_image() {
         let map = Envmap::new(Arc::new(image), 1.0, axes).expect("not black");
         // In the image's own frame cells and bins are both ranges of φ and cosθ.
         let y_up = Frame { s: axes * Vec3::Z, t: axes * Vec3::X, n: axes * Vec3::Y };
-        check(name, y_up, 2.0, |u| map.sample(u), |w| map.density(w));
+        let sample = |u| {
+            let (w, p_w, radiance) = map.sample(u);
+            let (seen, most) = (map.radiance(w), 1e-3 * map.integral().max_lane());
+            assert!((seen - radiance).0.abs().max_element() <= most + 0.02 * seen.max_lane(), "{name}: radiance at {w}");
+            (w, p_w)
+        };
+        check(name, y_up, 2.0, sample, |w| map.density(w));
     }
 }
 
