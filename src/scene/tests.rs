@@ -50,7 +50,8 @@ fn description() -> SceneDescription {
     let mut light = shape_of(ShapeModel::Disk, Mat4::from_translation(Vec3::Z * 4.0));
     light.flip_normals = true;
     light.emission = lamp(2.0, at(9));
-    scene.shapes = vec![shape_of(ShapeModel::Mesh { mesh: MeshId(0), face_normals: true }, Mat4::IDENTITY), floor, light];
+    let lifted = Mat4::from_translation(Vec3::Z * 0.1);
+    scene.shapes = vec![shape_of(ShapeModel::Mesh { mesh: MeshId(0), face_normals: true }, lifted), floor, light];
     let instance = |x| shape_of(ShapeModel::Instance { group: GroupId(0) }, Mat4::from_translation(Vec3::new(x, 0.0, 1.0)));
     scene.shapes.extend([instance(-2.0), instance(2.0)]);
     let ball = shape_of(ShapeModel::Sphere { center: Vec3::ZERO, radius: 0.5 }, Mat4::IDENTITY);
