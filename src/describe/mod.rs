@@ -7,6 +7,7 @@
 mod mesh;
 mod place;
 mod problem;
+mod validate;
 
 pub use mesh::smooth_normals;
 pub use place::{Place, Placed, SourceFile, Sources};

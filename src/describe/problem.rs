@@ -28,11 +28,18 @@ pub struct Problem {
 /// A growing list of problems.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Problems {
-    /// In order of discovery.
+    /// In order of discovery, at most [`Problems::MAX_LISTED`].
     pub list: Vec<Problem>,
+    /// How many more there were.
+    pub unlisted: usize,
+    /// The latest of those, so that its hint has a place to go.
+    last_unlisted: Option<Problem>,
 }
 
 impl Problems {
+    /// Problems that are kept: nobody reads more, and hostile input must not fill the memory.
+    pub const MAX_LISTED: usize = 1000;
+
     /// Adds an error.
     pub fn error(&mut self, place: Place, what: impl Into<String>) -> &mut Problem {
         self.push(Severity::Error, place, what.into())
@@ -44,8 +51,18 @@ impl Problems {
     }
 
     fn push(&mut self, severity: Severity, place: Place, what: String) -> &mut Problem {
-        self.list.push(Problem { severity, place, what, hint: None });
-        self.list.last_mut().expect("just pushed")
+        let problem = Problem { severity, place, what, hint: None };
+        if self.list.len() < Self::MAX_LISTED {
+            self.list.push(problem);
+            return self.list.last_mut().expect("just pushed");
+        }
+        self.unlisted += 1;
+        if severity == Severity::Error && !self.has_errors() {
+            let last = self.list.last_mut().expect("full");
+            *last = problem;
+            return last;
+        }
+        self.last_unlisted.insert(problem)
     }
 
     /// At least one error.
@@ -72,6 +89,9 @@ impl Problems {
             if let Some(hint) = &p.hint {
                 let _ = writeln!(out, "  help: {hint}");
             }
+        }
+        if self.unlisted > 0 {
+            let _ = writeln!(out, "and {} more problems", self.unlisted);
         }
         out
     }

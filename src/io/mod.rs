@@ -3,6 +3,7 @@
 //! - `assets`: replaces the file names in a scene by decoded meshes and images.
 //! - `obj`, `ply`, `serialized`: triangle meshes; `mesh` holds what they have in common.
 //! - `image`, `exr`, `png`: pictures in and out; `write`: output files, atomically.
+//! - `mitsuba`: the XML scene language of Mitsuba 3.
 //! - `fault`: why a file cannot be read or written.
 
 pub mod assets;
@@ -10,6 +11,7 @@ pub mod exr;
 pub mod fault;
 pub mod image;
 mod mesh;
+pub mod mitsuba;
 pub mod obj;
 pub mod ply;
 pub mod png;
