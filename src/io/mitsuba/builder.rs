@@ -37,6 +37,8 @@ pub struct Builder<'a> {
     pub meshes: HashMap<(PathBuf, u32, bool, MeshFormat), MeshId>,
     /// Images already named, by file and `raw`.
     pub images: HashMap<(PathBuf, bool), ImageId>,
+    /// Textures built so far, each use of a shared one counted.
+    pub textures: usize,
 }
 
 /// The properties of one element, matched with its plugin's table.
@@ -90,6 +92,7 @@ impl<'a> Builder<'a> {
             places: HashMap::new(),
             meshes: HashMap::new(),
             images: HashMap::new(),
+            textures: 0,
         }
     }
 
@@ -140,9 +143,13 @@ impl<'a> Builder<'a> {
         let Some(target) = self.tree.resolve(child) else { return };
         let (outer, inner) = (self.node(child), self.node(target));
         let name = outer.text("name");
-        let colour = matches!(inner.tag, Tag::Texture | Tag::Spectrum);
         if inner.is_object() {
-            if let Some(property) = name.and_then(|n| given.plugin.property(n)).filter(|p| colour && p.kind == Kind::Texture) {
+            let fits = |p: &&Property| match inner.tag {
+                Tag::Texture => p.kind == Kind::Texture,
+                Tag::Spectrum => matches!(p.kind, Kind::Texture | Kind::Colour),
+                _ => false,
+            };
+            if let Some(property) = name.and_then(|n| given.plugin.property(n)).filter(fits) {
                 self.take_value(given, property, target, outer.place);
             } else if let Some(property) = given.plugin.nested(inner.tag) {
                 self.take_object(given, property, target, outer.place);

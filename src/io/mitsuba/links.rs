@@ -92,18 +92,16 @@ impl<'a> Walk<'a> {
         for i in 0..self.tree.nodes[node].children.len() {
             let child = self.tree.nodes[node].children[i];
             let Some(target) = self.tree.resolve(child) else { continue };
-            if let State::Done { chain: c, unfolded: u } = self.states[target] {
-                chain = chain.max(c + 1);
-                unfolded = unfolded.saturating_add(u);
-            }
+            let State::Done { chain: its_chain, unfolded: its_unfolded } = self.states[target] else { continue };
+            let (longer, more) = (chain.max(its_chain + 1), unfolded.saturating_add(its_unfolded));
             let limited = matches!(self.tree.nodes[target].tag, Tag::Bsdf | Tag::Texture);
-            if chain > MAX_CHAIN || (limited && unfolded > MAX_UNFOLDED) {
+            if longer > MAX_CHAIN || (limited && more > MAX_UNFOLDED) {
                 let what = format!("references unfold to more than {MAX_CHAIN} levels or {MAX_UNFOLDED} elements here");
                 self.problems.error(self.tree.nodes[child].place, what);
                 self.tree.nodes[node].children.truncate(i);
-                (chain, unfolded) = (0, 1);
                 break;
             }
+            (chain, unfolded) = (longer, more);
         }
         self.states[node] = State::Done { chain, unfolded };
     }

@@ -32,6 +32,7 @@ use crate::describe::{Place, Problems, SceneDescription, Sources};
 use builder::Builder;
 use files::Search;
 use reader::Reader;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use tree::{Tag, Tree};
 
@@ -93,11 +94,18 @@ fn run(options: &LoadOptions, directory: &Path, read: impl FnOnce(&mut Reader)) 
     let (mut tree, search) = (std::mem::take(&mut reader.tree), std::mem::take(&mut reader.search));
     links::resolve(&mut tree, &mut problems);
     let scene = build(&tree, &search, &mut problems);
-    problems.list.sort_by_key(|p| (p.place.file, p.place.line, p.place.column));
+    order(&mut problems);
     if problems.has_errors() {
         return Err(LoadError { problems, sources: scene.sources });
     }
     Ok(Loaded { scene, warnings: problems })
+}
+
+/// By place; what is used twice is reported once.
+fn order(problems: &mut Problems) {
+    let mut seen = HashSet::new();
+    problems.list.retain(|p| seen.insert((p.place, p.what.clone())));
+    problems.list.sort_by_key(|p| (p.place.file, p.place.line, p.place.column));
 }
 
 /// Builds everything at top level, in file order, and checks the whole.

@@ -7,6 +7,9 @@ use crate::describe::*;
 
 const TO_UV: &[Property] = &[free("to_uv", Kind::Transform, "identity", "Affine map applied to (u, v) before the look-up")];
 
+/// Most textures of a scene, each use of a shared one counted.
+const MAX_TEXTURES: usize = 1 << 20;
+
 /// Textures.
 pub const TEXTURES: &[Plugin] = &[
     Plugin {
@@ -81,6 +84,13 @@ pub const SPECTRA: &[Plugin] = &[
 
 /// The texture or spectrum that an object describes; `None` if it cannot be read (reported).
 pub fn build(b: &mut Builder, index: NodeIndex) -> Option<TextureDescription> {
+    b.textures += 1;
+    if b.textures > MAX_TEXTURES {
+        if b.textures == MAX_TEXTURES + 1 {
+            b.problems.error(b.node(index).place, format!("the scene's textures unfold to more than {MAX_TEXTURES}"));
+        }
+        return None;
+    }
     let given = b.given(index)?;
     match given.plugin.name {
         "bitmap" => bitmap(b, &given),
