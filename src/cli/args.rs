@@ -1,0 +1,195 @@
+//! What can be written on the command line.
+
+use super::units;
+use crate::report::comparison::Metric;
+use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A bidirectional renderer: light and potential as one measurement.
+#[derive(Debug, Parser)]
+#[command(name = "nephroid", version, arg_required_else_help = true, after_help = EXIT_CODES)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done; 1 no (images differ); 2 usage or scene error; 4 output error;
+130 interrupted, with the image so far written.
+Data goes to standard output, everything else to standard error.";
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Read and build a scene, report every problem, render nothing.
+    Check(SceneArgs),
+    /// Say what is in a scene: shapes, triangles, bounds, emitters, memory.
+    Info(InfoArgs),
+    /// Say how an image differs from a reference.
+    Compare(CompareArgs),
+}
+
+/// How to read a scene.
+#[derive(Clone, Debug, Args)]
+pub struct SceneArgs {
+    /// Scene file (Mitsuba 3 XML).
+    #[arg(value_name = "SCENE.xml", value_hint = ValueHint::FilePath)]
+    pub scene: PathBuf,
+    /// Value for `$name` in the scene; stronger than its `<default>` (repeatable).
+    #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = units::define)]
+    pub define: Vec<(String, String)>,
+    /// Which of several sensors, by its id or its number from 0.
+    #[arg(long, value_name = "ID|N")]
+    pub sensor: Option<String>,
+    /// Read no file outside of this directory.
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub sandbox: Option<PathBuf>,
+    /// Threads [default: all that the machine has].
+    #[arg(short = 't', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+}
+
+/// Estimators by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum EstimatorName {
+    /// From the sensor: the rendering equation (path tracing).
+    Gather,
+    /// From the lights: the potential equation (light tracing).
+    Shoot,
+    /// Both, joined wherever they meet and weighted.
+    #[default]
+    Bidirectional,
+    /// What the scene's integrator element asks for.
+    Scene,
+}
+
+/// Joins of walks by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TechniqueName {
+    /// A gathering walk arrives on a light.
+    Hit,
+    /// A light point is picked from a gathering vertex.
+    #[value(alias = "next-event")]
+    Nee,
+    /// A shooting vertex is seen by the sensor.
+    Splat,
+    /// A gathering vertex is joined to a shooting vertex.
+    Connect,
+}
+
+/// Heuristics of multiple importance sampling by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum HeuristicName {
+    /// Weights in proportion to densities.
+    #[default]
+    Balance,
+    /// Weights in proportion to squared densities.
+    Power,
+}
+
+/// How to render.
+#[derive(Clone, Debug, Args)]
+pub struct RenderArgs {
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Image to write: .exr (linear, with variance) or .png (repeatable).
+    #[arg(short, long = "output", value_name = "OUT", required = true, value_hint = ValueHint::FilePath)]
+    pub output: Vec<PathBuf>,
+    /// Which equation to expand.
+    #[arg(short, long, value_enum, value_name = "NAME", default_value_t)]
+    pub estimator: EstimatorName,
+    /// Samples per pixel [default: the scene's, or 64; without end if only --time is given].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub spp: Option<u64>,
+    /// Time after which to stop, such as 20s or 5m.
+    #[arg(long, value_name = "TIME", value_parser = units::duration)]
+    pub time: Option<Duration>,
+    /// Seed of all random numbers [default: the scene's, or 0].
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Size of the film instead of the scene's, such as 640x480.
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    pub size: Option<[u32; 2]>,
+    /// Render only this window of the film.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = units::crop)]
+    pub crop: Option<[u32; 4]>,
+    /// Stops by which a PNG is brighter or darker; its curve is sRGB's.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// No progress, notes or warnings.
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Write figures about the render as JSON.
+    #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath)]
+    pub stats: Option<PathBuf>,
+    /// Most memory that the film may take [default: what the machine has free].
+    #[arg(long, value_name = "SIZE", value_parser = units::memory)]
+    pub max_memory: Option<u64>,
+    /// Transport.
+    #[command(flatten, next_help_heading = "Transport")]
+    pub transport: TransportArgs,
+}
+
+/// Which paths, by which joins.
+#[derive(Clone, Debug, Args)]
+pub struct TransportArgs {
+    /// Joins that are allowed, instead of the estimator's.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    pub techniques: Option<Vec<TechniqueName>>,
+    /// How joins share a path.
+    #[arg(long, value_enum, value_name = "NAME", default_value_t)]
+    pub heuristic: HeuristicName,
+    /// Shortest path in edges (1 = a lamp seen directly).
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub min_length: u32,
+    /// Longest path in edges [default: the scene's max_depth].
+    #[arg(long, value_name = "N")]
+    pub max_length: Option<u32>,
+    /// Only paths of a class, such as 'E D S+ L' or 'visible-to:gather,shoot'.
+    #[arg(long, value_name = "EXPR")]
+    pub paths: Option<String>,
+    /// Light paths per pass [default: one per pixel].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub light_paths: Option<u32>,
+    /// Connections from each gathering vertex.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub connections: u32,
+}
+
+/// What to say about a scene.
+#[derive(Clone, Debug, Args)]
+pub struct InfoArgs {
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// As JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What to compare.
+#[derive(Clone, Debug, Args)]
+pub struct CompareArgs {
+    /// The image to be judged.
+    #[arg(value_name = "IMAGE", value_hint = ValueHint::FilePath)]
+    pub image: PathBuf,
+    /// What it should look like.
+    #[arg(value_name = "REFERENCE", value_hint = ValueHint::FilePath)]
+    pub reference: PathBuf,
+    /// As JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Exit with 1 where the metric is beyond this (for welch: its p below this).
+    #[arg(long, value_name = "X", value_parser = finite)]
+    pub tolerance: Option<f64>,
+    /// What the tolerance is about.
+    #[arg(long, value_enum, default_value_t, requires = "tolerance")]
+    pub metric: Metric,
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0).ok_or_else(|| "expected a number of at least 0".into())
+}
