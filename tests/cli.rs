@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use nephroid::io::exr::ImageFile;
 use nephroid::io::png::PngOptions;
-use nephroid::io::write::{read_image, write_image};
+use nephroid::io::write::write_image;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
