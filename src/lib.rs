@@ -23,6 +23,7 @@ pub mod film;
 pub mod io;
 pub mod local;
 pub mod math;
+pub mod render;
 pub mod report;
 pub mod scene;
 pub mod spectrum;

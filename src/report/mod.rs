@@ -1,12 +1,14 @@
 //! What is said about images and scenes: how far apart two images are, whether chance explains it,
 //! and what an estimator misses.
 //!
+//! - [`agreement`]: whether estimators agree, block by block, over independent renders.
 //! - [`measures`]: RMSE, relMSE plain and trimmed, ratio of means.
 //! - [`flip`]: what an eye flipping between the two would see.
 //! - [`welch`]: whether two estimates with known variance have the same expectation.
 //! - [`comparison`]: all of them, as text and as JSON.
 //! - [`coverage`]: which paths an estimator cannot make in a scene.
 
+pub mod agreement;
 pub mod comparison;
 pub mod coverage;
 pub mod flip;

@@ -1,0 +1,98 @@
+//! Estimators by the equation they expand, and what a scene asks of them.
+
+use crate::scene::Scene;
+use crate::transport::mis::Heuristic;
+use crate::transport::settings::{Settings, Techniques};
+
+/// How the measurement is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Estimator {
+    /// `⟨L, Wᵉ⟩`: path tracing [Kajiya 1986].
+    Gather,
+    /// `⟨Lᵉ, W⟩`: light tracing [Arvo 1986].
+    Shoot,
+    /// Both, weighted: bidirectional path tracing [Veach 1997].
+    #[default]
+    Bidirectional,
+}
+
+impl Estimator {
+    /// Names on the command line.
+    pub const NAMES: [&str; 3] = ["gather", "shoot", "bidirectional"];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gather => "gather",
+            Self::Shoot => "shoot",
+            Self::Bidirectional => "bidirectional",
+        }
+    }
+
+    /// By name.
+    pub fn parse(name: &str) -> Option<Self> {
+        [Self::Gather, Self::Shoot, Self::Bidirectional].into_iter().find(|e| e.name() == name)
+    }
+
+    /// What an integrator element of a scene file means by its name.
+    pub fn of_integrator(name: &str) -> Self {
+        match name {
+            "ptracer" => Self::Shoot,
+            "bdpt" => Self::Bidirectional,
+            _ => Self::Gather,
+        }
+    }
+
+    /// Its joins.
+    pub fn techniques(self) -> Techniques {
+        match self {
+            Self::Gather => Techniques::GATHER,
+            Self::Shoot => Techniques::SHOOT,
+            Self::Bidirectional => Techniques::BIDIRECTIONAL,
+        }
+    }
+}
+
+/// Everything a render is asked.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Transport.
+    pub settings: Settings,
+    /// Threads; `None` = as many as the machine has.
+    pub threads: Option<usize>,
+    /// Crop window (x, y, width, height) instead of the scene's own.
+    pub crop: Option<[u32; 4]>,
+}
+
+impl Options {
+    /// What `estimator` does with the scene's own limits (`max_depth`, `rr_depth`, `hide_emitters`).
+    pub fn for_scene(scene: &Scene, estimator: Estimator) -> Self {
+        let i = &scene.integrator;
+        let settings = Settings {
+            techniques: estimator.techniques(),
+            max_length: i.max_depth.unwrap_or(u32::MAX),
+            rr_depth: i.rr_depth,
+            hide_emitters: i.hide_emitters,
+            ..Settings::default()
+        };
+        Self { settings, threads: None, crop: None }
+    }
+
+    /// Hash of all that decides the value of a sample.
+    pub(super) fn identity(&self, scene: &Scene) -> [u8; 32] {
+        let s = &self.settings;
+        let t = s.techniques;
+        let mut h = blake3::Hasher::new();
+        h.update(&scene.hash());
+        h.update(&[u8::from(t.hit), u8::from(t.next_event), u8::from(t.splat), u8::from(t.connect)]);
+        h.update(&[u8::from(s.heuristic == Heuristic::Power), u8::from(s.hide_emitters)]);
+        for n in [s.min_length, s.max_length, s.rr_depth, s.connections] {
+            h.update(&n.to_le_bytes());
+        }
+        h.update(&s.light_paths.map_or(u64::MAX, u64::from).to_le_bytes());
+        h.update(&s.seed.to_le_bytes());
+        h.update(s.paths.text().as_bytes());
+        h.update(env!("CARGO_PKG_VERSION").as_bytes());
+        h.finalize().into()
+    }
+}

@@ -1,0 +1,160 @@
+//! One pass after another: shoot, sort, gather.
+
+use super::Render;
+use crate::film::{Layout, Splat, SplatBins, TileBuffer};
+use crate::math::Random;
+use crate::math::random::Family;
+use crate::transport::cache::{LightCache, LightVertex};
+use crate::transport::gather::gather;
+use crate::transport::shoot::shoot;
+use crate::transport::walk::{Context, Tally};
+use crate::transport::{Contribution, RayCounts, Record};
+use glam::Vec2;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::time::Instant;
+
+/// Light paths of one job.
+pub const SHOOT_JOB: u32 = 4096;
+
+/// Writes what gathering walks find into the pixel being sampled.
+struct PixelRecord<'a> {
+    buffer: &'a mut TileBuffer,
+    local: usize,
+}
+
+impl Record for PixelRecord<'_> {
+    #[inline]
+    fn gathered(&mut self, c: Contribution) {
+        self.buffer.add(self.local, c.value.to_rgb());
+    }
+    fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
+}
+
+/// Writes what shooting walks find as messages to pixels.
+struct SplatRecord<'a> {
+    filter: &'a crate::film::Filter,
+    layout: Layout,
+    crop: [u32; 4],
+    splats: Vec<Splat>,
+}
+
+impl Record for SplatRecord<'_> {
+    fn gathered(&mut self, _: Contribution) {}
+    #[inline]
+    fn splatted(&mut self, raster: Vec2, random: &mut Random, c: Contribution) {
+        let Some((x, y, weight)) = self.filter.splat_pixel(raster, random.unit2()) else { return };
+        let (x, y) = (i64::from(x) - i64::from(self.crop[0]), i64::from(y) - i64::from(self.crop[1]));
+        if (0..i64::from(self.crop[2])).contains(&x) && (0..i64::from(self.crop[3])).contains(&y) {
+            let pixel = self.layout.pixel(x as u32, y as u32);
+            self.splats.push(Splat { pixel, value: (c.value * weight).to_rgb() });
+        }
+    }
+}
+
+/// What a shooting job found.
+struct Shot {
+    splats: Vec<Splat>,
+    vertices: Vec<LightVertex>,
+    rays: RayCounts,
+}
+
+/// Runs these passes into the film of `render`.
+pub fn run(render: &mut Render<'_>, range: Range<u64>) {
+    if render.plan.light_paths == 0 {
+        gather_passes(render, range, &LightCache::default(), None);
+        return;
+    }
+    let mut bins = SplatBins::default();
+    for pass in range {
+        let before = Instant::now();
+        let (cache, splats) = shoot_pass(render, pass);
+        bins.fill(render.film.layout(), &splats);
+        render.statistics.light_vertices = u64::from(cache.len());
+        render.statistics.shoot_time += before.elapsed();
+        gather_passes(render, pass..pass + 1, &cache, Some(&bins));
+    }
+}
+
+/// Shoots all light paths of a pass.
+fn shoot_pass(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat>>) {
+    let plan = &render.plan;
+    let cx = Context { scene: render.scene, plan };
+    let jobs = plan.light_paths.div_ceil(SHOOT_JOB);
+    let shots: Vec<Shot> = (0..jobs)
+        .into_par_iter()
+        .map(|job| {
+            let paths = job * SHOOT_JOB..((job + 1).saturating_mul(SHOOT_JOB)).min(plan.light_paths);
+            let mut record = SplatRecord {
+                filter: &render.filter,
+                layout: render.film.layout(),
+                crop: render.crop,
+                splats: Vec::with_capacity(SHOOT_JOB as usize),
+            };
+            let mut vertices = Vec::with_capacity(if plan.c > 0.0 { 3 * SHOOT_JOB as usize } else { 0 });
+            let mut rays = RayCounts::default();
+            let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
+            for index in paths {
+                let mut random = Random::new(Family::Shoot, u64::from(index), pass, plan.settings.seed);
+                let cache = if plan.c > 0.0 { Some(&mut vertices) } else { None };
+                shoot(cx, cache, &mut random, &mut tally);
+            }
+            Shot { splats: record.splats, vertices, rays }
+        })
+        .collect();
+    let mut pieces = Vec::with_capacity(shots.len());
+    let mut splats = Vec::with_capacity(shots.len());
+    for shot in shots {
+        render.statistics.rays.add(&shot.rays);
+        pieces.push(shot.vertices);
+        splats.push(shot.splats);
+    }
+    (LightCache::new(pieces), splats)
+}
+
+/// Gathers one sample per pixel and pass, adds the splats, and commits the passes to the film.
+fn gather_passes(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache, bins: Option<&SplatBins>) {
+    let (scene, plan, filter, crop) = (render.scene, &render.plan, &render.filter, render.crop);
+    let cx = Context { scene, plan };
+    let exponent = render.film.exponent();
+    let gathers = plan.settings.techniques.gathers();
+    let film_width = u64::from(scene.film.width);
+    let passes = range.clone();
+    let rays = render
+        .film
+        .tiles_mut()
+        .map(|(index, rect, tile)| {
+            let mut buffer = TileBuffer::new(exponent);
+            let mut rays = RayCounts::default();
+            for pass in passes.clone() {
+                if let Some(bins) = bins {
+                    for s in bins.tile(index) {
+                        buffer.add(Layout::local_of(s.pixel), s.value);
+                    }
+                }
+                if gathers {
+                    for (x, y, local) in rect.pixels() {
+                        let (px, py) = (crop[0] + x, crop[1] + y);
+                        let id = u64::from(py) * film_width + u64::from(px);
+                        let mut random = Random::new(Family::Gather, id, pass, plan.settings.seed);
+                        let (offset, weight) = filter.sample_offset(random.unit2());
+                        let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
+                        let mut record = PixelRecord { buffer: &mut buffer, local };
+                        let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
+                        gather(cx, raster, weight, cache, &mut random, &mut tally);
+                    }
+                }
+                tile.commit(&mut buffer);
+            }
+            rays
+        })
+        .reduce(RayCounts::default, |mut a, b| {
+            a.add(&b);
+            a
+        });
+    render.statistics.rays.add(&rays);
+    // The range was free: `run` and `run_passes` ask for passes that are not in the film.
+    let added = render.film.add_passes(range);
+    debug_assert!(added.is_ok());
+}
+

@@ -1,0 +1,168 @@
+//! Do two estimators agree? Welch's test per block of pixels, Šidák's correction over blocks.
+//!
+//! Each estimator renders the same measurement several times, independently; a block's value in
+//! every render is one draw. Where a block's draws are dominated by a few outliers (effective number
+//! of samples `(Σx)²/Σx²` below [`MIN_EFFECTIVE`]) the means are not normal enough for a test: such
+//! blocks are pooled with their neighbours into 2 × 2, 4 × 4, … blocks until they are. The share of
+//! energy that could be tested at all is part of the verdict.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Effective samples that a block needs on both sides.
+pub const MIN_EFFECTIVE: f64 = 30.0;
+
+/// Block values of independent renders.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BlockSeries {
+    /// Blocks per row.
+    pub columns: usize,
+    /// Rows of blocks.
+    pub rows: usize,
+    /// `draws[render][block]`.
+    pub draws: Vec<Vec<f64>>,
+}
+
+/// Mean, variance and number of draws of one block (or pooled blocks).
+#[derive(Clone, Copy, Debug)]
+struct Moments {
+    mean: f64,
+    variance: f64,
+    n: f64,
+    effective: f64,
+}
+
+/// One test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockTest {
+    /// Column and row of the first block.
+    pub at: (usize, usize),
+    /// Blocks per side that were pooled.
+    pub side: usize,
+    /// Means of both estimators.
+    pub means: (f64, f64),
+    /// Welch's statistic.
+    pub z: f64,
+    /// Two-sided probability of a larger one where both agree.
+    pub p: f64,
+}
+
+/// The verdict over all blocks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// All tests.
+    pub tests: Vec<BlockTest>,
+    /// Probability of the most extreme test, corrected for the number of tests; 1 without any.
+    pub p: f64,
+    /// Share of the energy (mean of both estimators) inside tested blocks; 1 where there is none.
+    pub energy_tested: f64,
+    /// Means over all blocks.
+    pub totals: (f64, f64),
+}
+
+impl BlockSeries {
+    fn moments(&self, blocks: &[usize]) -> Moments {
+        let n = self.draws.len() as f64;
+        let sums = self.draws.iter().map(|d| blocks.iter().map(|b| d[*b]).sum::<f64>());
+        let (s, s2) = sums.fold((0.0, 0.0), |(s, s2), x| (s + x, s2 + x * x));
+        let mean = s / n;
+        let variance = ((s2 - s * mean) / (n - 1.0)).max(0.0);
+        Moments { mean, variance, n, effective: if s2 > 0.0 { s * s / s2 } else { 0.0 } }
+    }
+
+    fn total(&self) -> f64 {
+        self.moments(&(0..self.columns * self.rows).collect::<Vec<_>>()).mean
+    }
+}
+
+/// Welch's test of equal means; `None` where neither side varies.
+fn welch(a: Moments, b: Moments) -> Option<(f64, f64)> {
+    let (va, vb) = (a.variance / a.n, b.variance / b.n);
+    let v = va + vb;
+    let difference = a.mean - b.mean;
+    if v <= 0.0 {
+        // Deterministic on both sides: equal up to rounding, or surely different.
+        let scale = a.mean.abs().max(b.mean.abs());
+        return if difference.abs() <= 1e-5 * scale { None } else { Some((f64::INFINITY, 0.0)) };
+    }
+    let z = difference / v.sqrt();
+    let dof = v * v / (va * va / (a.n - 1.0) + vb * vb / (b.n - 1.0)).max(f64::MIN_POSITIVE);
+    let t = StudentsT::new(0.0, 1.0, dof.clamp(1.0, 1e6)).ok()?;
+    Some((z, 2.0 * t.cdf(-z.abs())))
+}
+
+/// Compares two series of the same blocks.
+pub fn agreement(a: &BlockSeries, b: &BlockSeries) -> Agreement {
+    assert_eq!((a.columns, a.rows), (b.columns, b.rows), "series of different blocks");
+    let mut open: Vec<bool> = vec![true; a.columns * a.rows];
+    let mut out = Agreement { p: 1.0, totals: (a.total(), b.total()), ..Agreement::default() };
+    let mut energy = 0.0;
+    let mut side = 1;
+    while side < 2 * a.columns.max(a.rows) {
+        for row in (0..a.rows).step_by(side) {
+            for column in (0..a.columns).step_by(side) {
+                let cells = (row..(row + side).min(a.rows))
+                    .flat_map(|y| (column..(column + side).min(a.columns)).map(move |x| y * a.columns + x));
+                let blocks: Vec<usize> = cells.filter(|b| open[*b]).collect();
+                let (ma, mb) = (a.moments(&blocks), b.moments(&blocks));
+                if blocks.is_empty() || ma.effective < MIN_EFFECTIVE || mb.effective < MIN_EFFECTIVE {
+                    continue;
+                }
+                if let Some((z, p)) = welch(ma, mb) {
+                    out.tests.push(BlockTest { at: (column, row), side, means: (ma.mean, mb.mean), z, p });
+                }
+                energy += 0.5 * (ma.mean + mb.mean);
+                blocks.iter().for_each(|b| open[*b] = false);
+            }
+        }
+        side *= 2;
+    }
+    let smallest = out.tests.iter().map(|t| t.p).fold(1.0, f64::min);
+    out.p = sidak(smallest, out.tests.len());
+    let total = 0.5 * (out.totals.0 + out.totals.1);
+    out.energy_tested = if total > 0.0 { energy / total } else { 1.0 };
+    out
+}
+
+/// Probability that the smallest of `n` independent p-values is at most `p`.
+pub fn sidak(p: f64, n: usize) -> f64 {
+    if n == 0 { 1.0 } else { -((n as f64) * (-p.min(1.0)).ln_1p()).exp_m1() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::math::random::Family;
+
+    fn series(seed: u64, means: &[f64], columns: usize) -> BlockSeries {
+        let mut random = Random::new(Family::Other, seed, 0, 0);
+        let mut draw = |m: f64| m * (0..12).map(|_| f64::from(random.unit())).sum::<f64>() / 6.0;
+        let draws = (0..64).map(|_| means.iter().map(|m| draw(*m)).collect()).collect();
+        BlockSeries { columns, rows: means.len() / columns, draws }
+    }
+
+    #[test]
+    fn equal_means_agree_and_different_means_do_not() {
+        let means: Vec<f64> = (0..64).map(|i| 1.0 + f64::from(i % 5)).collect();
+        let mut smallest: f64 = 1.0;
+        for seed in 0..20 {
+            let v = agreement(&series(seed, &means, 8), &series(100 + seed, &means, 8));
+            assert!((v.energy_tested - 1.0).abs() < 1e-12);
+            smallest = smallest.min(v.p);
+        }
+        assert!(smallest > 1e-3, "{smallest}");
+        let mut other = means.clone();
+        other[11] *= 1.4;
+        assert!(agreement(&series(1, &means, 8), &series(2, &other, 8)).p < 1e-4);
+    }
+
+    #[test]
+    fn outliers_are_pooled_or_left_out() {
+        let mut a = series(1, &[1.0; 16], 4);
+        a.draws.iter_mut().enumerate().for_each(|(i, d)| d[5] = if i == 0 { 64.0 } else { 0.0 });
+        let v = agreement(&a, &series(2, &[1.0; 16], 4));
+        assert!(v.tests.iter().all(|t| t.side > 1 || t.at != (1, 1)));
+        assert!(v.energy_tested > 0.9);
+        assert!(v.p > 1e-4, "{}", v.p);
+    }
+}

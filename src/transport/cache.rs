@@ -1,0 +1,68 @@
+//! Light vertices kept for connections.
+
+use super::class::Positions;
+use super::mis::Partial;
+use crate::scene::Surface;
+use crate::spectrum::Spectrum;
+use glam::Vec3;
+
+/// A vertex of a shooting walk at which a gathering walk can end.
+#[derive(Clone, Debug)]
+pub struct LightVertex {
+    /// The point.
+    pub surface: Surface,
+    /// Unit direction to its predecessor (towards the light).
+    pub w_back: Vec3,
+    /// Flux arriving per light path, over its density.
+    pub throughput: Spectrum,
+    /// MIS sum on arrival.
+    pub partial: Partial<f32>,
+    /// Edges from the light point.
+    pub length: u32,
+    /// Positions of the path expression from which the light is reached, this vertex excluded.
+    pub class: Positions,
+    /// The vertex next to the light scattered by a Dirac event.
+    pub first_delta: bool,
+    /// The light cannot be hit.
+    pub light_delta: bool,
+}
+
+/// All light vertices of one pass, in the order of their light paths; as many pieces as jobs made
+/// them, so that nothing is copied together.
+#[derive(Clone, Debug, Default)]
+pub struct LightCache {
+    pieces: Vec<Vec<LightVertex>>,
+    /// Index of the first vertex of each piece; the total at the end.
+    starts: Vec<u32>,
+}
+
+impl LightCache {
+    /// From what each job found. At most 2³² − 1 vertices are used.
+    pub fn new(pieces: Vec<Vec<LightVertex>>) -> Self {
+        let mut starts = vec![0u32];
+        let mut total = 0u32;
+        for p in &pieces {
+            total = total.saturating_add(u32::try_from(p.len()).unwrap_or(u32::MAX));
+            starts.push(total);
+        }
+        Self { pieces, starts }
+    }
+
+    /// Number of vertices.
+    #[inline]
+    pub fn len(&self) -> u32 {
+        self.starts.last().copied().unwrap_or(0)
+    }
+
+    /// Without vertices.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Vertex `i` of all, `i < len()`.
+    #[inline]
+    pub fn get(&self, i: u32) -> &LightVertex {
+        let piece = self.starts.partition_point(|s| *s <= i) - 1;
+        &self.pieces[piece][(i - self.starts[piece]) as usize]
+    }
+}

@@ -1,0 +1,308 @@
+//! The gathering walk: expands `L = Lᵉ + τL` from the sensor.
+//!
+//! With hits and next events alone this is path tracing [Kajiya 1986]; with the sums of [`super::mis`]
+//! it is the eye's half of bidirectional path tracing [Veach 1997, ch. 10].
+
+use super::cache::LightCache;
+use super::class::{PathEnds, Symbol};
+use super::mis::{self, Partial};
+use super::mutant::{Mutant, planted};
+use super::vertex::Vertex;
+use super::walk::{Arrival, Context, Join, Observe, Tally, Walk, end, sees_light, spawn};
+use super::{Contribution, Record, Technique};
+use crate::local::Equation;
+use crate::math::Random;
+use crate::scene::emitter::EmitterPoint;
+use crate::scene::geometry::Ray;
+use crate::scene::{EmitterId, Surface};
+use crate::spectrum::Spectrum;
+use glam::{Vec2, Vec3};
+
+const EQUATION: Equation = Equation::Rendering;
+
+/// One sample of the pixel seen at `raster` (pixels of the whole film), `weight` the factor of its
+/// reconstruction filter; `lights` are this pass's light vertices.
+pub fn gather<R: Record, O: Observe>(
+    cx: Context<'_>,
+    raster: Vec2,
+    weight: f32,
+    lights: &LightCache,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let start = scene.sensor.sample_ray(raster, random.unit2());
+    tally.rays.gather_walks += 1;
+    tally.observe.started(start.lens, None);
+    let mut ray = Ray { o: start.o, d: start.d, t_max: start.t_max };
+    let mut walk = Walk {
+        throughput: Spectrum::ONE * weight,
+        k: 0.0,
+        p: scene.sensor.density(start.d),
+        delta: false,
+        from: start.lens,
+        cos_from: 1.0,
+        parallel: scene.sensor.is_orthographic(),
+        length: 0,
+        eta: 1.0,
+        class: plan.settings.paths.eye(),
+        first_delta: false,
+    };
+    loop {
+        tally.rays.gather += 1;
+        let Some(hit) = scene.geometry.intersect(&ray) else {
+            hit_environment(cx, &walk, ray.d, tally);
+            return;
+        };
+        let surface = scene.geometry.surface(&ray, &hit);
+        let length = walk.length + 1;
+        let arrival = walk.arrive(&surface, ray.d);
+        if surface.emitter != EmitterId::NONE {
+            hit_emitter(cx, &walk, &surface, ray.d, arrival, tally);
+        }
+        if length >= plan.settings.max_length {
+            return;
+        }
+        tally.observe.arrived(&surface);
+        let vertex = Vertex::new(scene, surface, -ray.d);
+        let count = if walk.length == 0 {
+            plan.n
+        } else if walk.delta {
+            0.0
+        } else {
+            plan.c
+        };
+        let partial = walk.partial(plan.settings.heuristic, arrival, count);
+        if !vertex.closure.is_delta() {
+            if plan.settings.techniques.next_event {
+                next_event(cx, &walk, &vertex, partial, random, tally);
+            }
+            if plan.c > 0.0 {
+                connect(cx, &walk, &vertex, partial, lights, random, tally);
+            }
+        }
+        let (u_lobe, u) = (random.unit(), random.unit2());
+        let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
+        tally.observe.scattered(&s);
+        walk.leave(cx, &vertex, partial, &s);
+        walk.classify(&plan.settings.paths, EQUATION, s.delta);
+        if !walk.survives(plan, 1.0, random) {
+            return;
+        }
+        ray = spawn(&vertex.surface, s.w_next);
+    }
+}
+
+/// Hands on a finished path if it counts.
+#[inline]
+fn finish<R: Record, O: Observe>(
+    cx: Context<'_>,
+    from_light: u64,
+    from_eye: u64,
+    ends: PathEnds,
+    value: Spectrum,
+    join: Join<'_>,
+    light_vertices: u32,
+    tally: &mut Tally<'_, R, O>,
+) {
+    if cx.plan.settings.paths.accepts(from_eye, from_light, ends) {
+        tally.record.gathered(Contribution { value, length: join.length, light_vertices, technique: join.technique });
+        tally.observe.joined(join);
+    }
+}
+
+/// The walk arrived on an area light.
+#[inline]
+fn hit_emitter<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    surface: &Surface,
+    d: Vec3,
+    arrival: Arrival,
+    tally: &mut Tally<'_, R, O>,
+) {
+    if !cx.plan.settings.techniques.hit || !cx.plan.wants_length(walk.length + 1) {
+        return;
+    }
+    let point = EmitterPoint::on_surface(surface);
+    let radiance = cx.scene.lights.radiance(&point, -d);
+    if !radiance.is_black() {
+        hit(cx, walk, &point, d, radiance, arrival, tally);
+    }
+}
+
+/// The walk left the scene.
+#[inline]
+fn hit_environment<R: Record, O: Observe>(cx: Context<'_>, walk: &Walk, d: Vec3, tally: &mut Tally<'_, R, O>) {
+    if !cx.plan.settings.techniques.hit || !cx.plan.wants_length(walk.length + 1) {
+        return;
+    }
+    cx.scene.lights.environment(d, |emitter, radiance| {
+        let point = EmitterPoint::at_infinity(emitter, d);
+        hit(cx, walk, &point, d, radiance, Arrival { inv_d2: 1.0, p_a: walk.p }, tally);
+    });
+}
+
+#[inline]
+fn hit<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    point: &EmitterPoint,
+    d: Vec3,
+    radiance: Spectrum,
+    arrival: Arrival,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let length = walk.length + 1;
+    let weight = if length == 1 {
+        1.0
+    } else {
+        let nu = if plan.settings.techniques.next_event && !walk.delta {
+            scene.lights.density_next_event(&scene.geometry, walk.from, point, d)
+        } else {
+            0.0
+        };
+        let e = if plan.two_sided {
+            let e = scene.lights.density_emission(point, -d);
+            e.p_k * e.p_next * walk.cos_from * arrival.inv_d2
+        } else {
+            0.0
+        };
+        mis::hit(plan.settings.heuristic, arrival.p_a, nu, e, walk.k)
+    };
+    let ends = PathEnds { length, first_delta: walk.first_delta, last_delta: walk.delta, light_delta: false };
+    let value = walk.throughput * radiance * weight;
+    let join = Join {
+        technique: Technique::Hit,
+        weight,
+        length,
+        light: Some(point),
+        light_delta: false,
+        light_vertex: 0,
+        lens: Vec3::ZERO,
+    };
+    finish(cx, plan.settings.paths.light(), walk.class, ends, value, join, 0, tally);
+}
+
+/// Picks a light point from `vertex`.
+#[inline]
+fn next_event<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    vertex: &Vertex,
+    partial: Partial<f32>,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let (u_pick, u) = (random.unit(), random.unit2());
+    let length = walk.length + 2;
+    if !plan.wants_length(length) {
+        return;
+    }
+    let x = &vertex.surface;
+    let Some(mut ne) = scene.lights.sample_next_event(&scene.geometry, x.p, u_pick, u) else { return };
+    if planted(Mutant::NextEventDensity) {
+        ne.nu *= 1.5;
+    }
+    let Some(k) = vertex.kernel(EQUATION, ne.w) else { return };
+    let h = plan.settings.heuristic;
+    let g = if plan.settings.techniques.hit && !ne.delta { k.p_w * ne.g } else { 0.0 };
+    let e = if plan.two_sided { ne.emission.p_k * ne.emission.p_next * k.cos_g * ne.inv_d2 } else { 0.0 };
+    let weight = mis::next_event(h, ne.nu, g, e, partial.at(h, k.p_w_rev));
+    let value = walk.throughput * k.value * ne.radiance * (ne.g / ne.nu * weight);
+    if value.is_black() {
+        return;
+    }
+    tally.rays.shadow += 1;
+    if !sees_light(scene, x, &ne) {
+        return;
+    }
+    let first_delta = walk.length > 0 && walk.first_delta;
+    let ends = PathEnds { length, first_delta, last_delta: false, light_delta: ne.delta };
+    let from_eye = plan.settings.paths.forward(walk.class, Symbol::D);
+    let join = Join {
+        technique: Technique::NextEvent,
+        weight,
+        length,
+        light: Some(&ne.point),
+        light_delta: ne.delta,
+        light_vertex: 0,
+        lens: Vec3::ZERO,
+    };
+    finish(cx, plan.settings.paths.light(), from_eye, ends, value, join, 1, tally);
+}
+
+/// Joins `vertex` to light vertices picked uniformly from the cache.
+#[inline]
+fn connect<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    vertex: &Vertex,
+    partial: Partial<f32>,
+    lights: &LightCache,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let available = lights.len();
+    if available == 0 {
+        return;
+    }
+    // The estimator uses this pass's own number of vertices, the weights the pilot's.
+    let inv_prob = available as f32 * plan.inv_light_paths / plan.settings.connections as f32;
+    let h = plan.settings.heuristic;
+    for _ in 0..plan.settings.connections {
+        let picked = random.below(available);
+        let y = lights.get(picked);
+        let length = walk.length + 2 + y.length;
+        if !plan.wants_length(length) {
+            continue;
+        }
+        let d = y.surface.p - vertex.surface.p;
+        let d2 = d.length_squared();
+        if d2 <= 0.0 {
+            continue;
+        }
+        let w = d / d2.sqrt();
+        let Some(k_eye) = vertex.kernel(EQUATION, w) else { continue };
+        let light = Vertex::new(scene, y.surface, y.w_back);
+        let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
+        let inv_d2 = 1.0 / d2;
+        let weight = mis::connect(
+            h,
+            plan.c,
+            k_light.p_w * k_eye.cos_g * inv_d2,
+            partial.at(h, k_eye.p_w_rev),
+            k_eye.p_w * k_light.cos_g * inv_d2,
+            y.partial.at(h, k_light.p_w_rev),
+        );
+        let value = walk.throughput * k_eye.value * y.throughput * k_light.value * (inv_d2 * inv_prob * weight);
+        if value.is_black() {
+            continue;
+        }
+        tally.rays.shadow += 1;
+        if !scene.geometry.visible(end(&vertex.surface), end(&y.surface)) {
+            continue;
+        }
+        let ends = PathEnds {
+            length,
+            first_delta: walk.length > 0 && walk.first_delta,
+            last_delta: y.length > 1 && y.first_delta,
+            light_delta: y.light_delta,
+        };
+        let paths = &plan.settings.paths;
+        let (from_eye, from_light) = (paths.forward(walk.class, Symbol::D), paths.backward(y.class, Symbol::D));
+        let join = Join {
+            technique: Technique::Connect,
+            weight,
+            length,
+            light: None,
+            light_delta: y.light_delta,
+            light_vertex: picked as usize,
+            lens: Vec3::ZERO,
+        };
+        finish(cx, from_light, from_eye, ends, value, join, y.length + 1, tally);
+    }
+}

@@ -1,0 +1,156 @@
+//! What a render is asked to do: which joins, which paths, how many of each.
+
+use super::class::PathFilter;
+use super::mis::Heuristic;
+use super::mutant::{Mutant, planted};
+
+/// Joins that are allowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Techniques {
+    /// Gathering walks arrive on emitters.
+    pub hit: bool,
+    /// Light points are picked from gathering vertices.
+    pub next_event: bool,
+    /// Shooting vertices are seen by the lens.
+    pub splat: bool,
+    /// Gathering vertices are joined to shooting vertices.
+    pub connect: bool,
+}
+
+impl Techniques {
+    /// Hits and next events (path tracing, Kajiya 1986).
+    pub const GATHER: Self = Self { hit: true, next_event: true, splat: false, connect: false };
+    /// Splats (light tracing, Arvo 1986).
+    pub const SHOOT: Self = Self { hit: false, next_event: false, splat: true, connect: false };
+    /// All four (bidirectional path tracing, Lafortune 1993, Veach 1994).
+    pub const BIDIRECTIONAL: Self = Self { hit: true, next_event: true, splat: true, connect: true };
+
+    /// From a list such as `hit,nee,splat,connect`; the unknown name is the error.
+    pub fn parse(list: &str) -> Result<Self, String> {
+        let mut t = Self { hit: false, next_event: false, splat: false, connect: false };
+        for name in list.split(',').map(str::trim).filter(|s| !s.is_empty()) {
+            match name {
+                "hit" => t.hit = true,
+                "nee" | "next-event" => t.next_event = true,
+                "splat" => t.splat = true,
+                "connect" => t.connect = true,
+                other => return Err(other.to_owned()),
+            }
+        }
+        Ok(t)
+    }
+
+    /// The names [`Techniques::parse`] knows.
+    pub const NAMES: [&str; 4] = ["hit", "nee", "splat", "connect"];
+
+    /// A gathering walk is needed.
+    pub fn gathers(self) -> bool {
+        self.hit || self.next_event || self.connect
+    }
+
+    /// A shooting walk is needed.
+    pub fn shoots(self) -> bool {
+        self.splat || self.connect
+    }
+}
+
+/// Everything that decides what is estimated and by which joins.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Joins that are allowed.
+    pub techniques: Techniques,
+    /// From densities to weights.
+    pub heuristic: Heuristic,
+    /// Shortest path in edges.
+    pub min_length: u32,
+    /// Longest path in edges.
+    pub max_length: u32,
+    /// Path length from which Russian roulette may end a walk.
+    pub rr_depth: u32,
+    /// Leave out paths of length 1.
+    pub hide_emitters: bool,
+    /// Light paths per pass; `None` = one per pixel.
+    pub light_paths: Option<u32>,
+    /// Connections per gathering vertex.
+    pub connections: u32,
+    /// Classes of paths that count.
+    pub paths: PathFilter,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            techniques: Techniques::BIDIRECTIONAL,
+            heuristic: Heuristic::Balance,
+            min_length: 1,
+            max_length: u32::MAX,
+            rr_depth: 5,
+            hide_emitters: false,
+            light_paths: None,
+            connections: 1,
+            paths: PathFilter::default(),
+            seed: 0,
+        }
+    }
+}
+
+/// Settings with all counts fixed, as the walks use them; immutable during a render.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What is asked for.
+    pub settings: Settings,
+    /// Light paths of a pass; 0 where nothing shoots.
+    pub light_paths: u32,
+    /// N of the weights: light paths per camera sample, 0 where splats are off.
+    pub n: f32,
+    /// c of the weights: connections per camera sample and light vertex, with the mean number of
+    /// light vertices of the pilot (not this pass's own, which depends on its light paths).
+    pub c: f32,
+    /// Reverse densities matter: both walkers take part in the weights.
+    pub two_sided: bool,
+    /// Shooting makes paths of length 1 (hits are off).
+    pub splat_emitters: bool,
+    /// Factor on splats from normalisation, 1/N.
+    pub inv_light_paths: f32,
+}
+
+/// Longest path that is ever walked: roulette ends walks long before, except where it is off.
+pub const LONGEST_PATH: u32 = 65_535;
+
+impl Plan {
+    /// Counts for a crop window of `pixels` pixels in a film of `film_pixels`, where a light path
+    /// leaves `vertices_per_path` light vertices on average (from a pilot; only connections need it).
+    pub fn new(settings: &Settings, pixels: u32, film_pixels: u32, vertices_per_path: f64) -> Self {
+        let t = settings.techniques;
+        let light_paths = if t.shoots() { settings.light_paths.unwrap_or(pixels).max(1) } else { 0 };
+        let mean_vertices = vertices_per_path * f64::from(light_paths);
+        let c = if t.connect && settings.connections > 0 && mean_vertices > 0.0 {
+            (f64::from(settings.connections) * f64::from(light_paths) / mean_vertices) as f32
+        } else {
+            0.0
+        };
+        let n = if t.splat { light_paths as f32 } else { 0.0 };
+        let normaliser = if planted(Mutant::SplatCropNormalisation) { film_pixels } else { light_paths };
+        let mut settings = settings.clone();
+        settings.max_length = settings.max_length.min(LONGEST_PATH);
+        Self {
+            light_paths,
+            n,
+            c,
+            two_sided: (n > 0.0 || c > 0.0) && t.gathers(),
+            splat_emitters: t.splat && !t.hit,
+            inv_light_paths: if light_paths > 0 { 1.0 / normaliser as f32 } else { 0.0 },
+            settings,
+        }
+    }
+
+    /// Whether a finished path counts.
+    #[inline]
+    pub fn wants_length(&self, length: u32) -> bool {
+        length >= self.settings.min_length
+            && length <= self.settings.max_length
+            && !(length == 1 && self.settings.hide_emitters)
+    }
+}

@@ -1,0 +1,206 @@
+//! The shooting walk: expands `W = Wᵉ + τ'W` from the lights.
+//!
+//! With splats alone this is light tracing [Arvo 1986; Dutré 1993]; its vertices also feed the
+//! cache that gathering walks connect to.
+
+use super::cache::LightVertex;
+use super::class::{PathEnds, Symbol};
+use super::mis::{self, Partial};
+use super::vertex::Vertex;
+use super::walk::{Context, Join, Observe, Tally, Walk, end, free, spawn};
+use super::{Contribution, Record, Technique};
+use crate::local::Equation;
+use crate::math::Random;
+use crate::scene::geometry::{Ray, offset_origin};
+use crate::scene::sensor::SensorConnection;
+use crate::spectrum::Spectrum;
+use glam::Vec3;
+
+const EQUATION: Equation = Equation::Potential;
+
+/// One light path; its vertices are appended to `cache` where connections want them.
+pub fn shoot<R: Record, O: Observe>(
+    cx: Context<'_>,
+    mut cache: Option<&mut Vec<LightVertex>>,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    tally.rays.shoot_walks += 1;
+    if plan.splat_emitters && plan.wants_length(1) {
+        splat_emitter(cx, random, tally);
+    }
+    let (u_pick, u_position, u_direction) = (random.unit(), random.unit2(), random.unit2());
+    let Some(start) = scene.lights.sample_emission(&scene.geometry, u_pick, u_position, u_direction) else { return };
+    tally.observe.started(start.point.y, Some((&start.point, start.delta)));
+    let h = plan.settings.heuristic;
+    let d = &start.density;
+    let hits = plan.settings.techniques.hit && !start.delta;
+    let cos_from = if start.infinite || start.delta { 1.0 } else { start.point.n_g.dot(start.w).abs() };
+    let mut walk = Walk {
+        throughput: start.weight,
+        k: if hits { 1.0 / h.raise(d.p_k) } else { 0.0 },
+        p: d.p_next,
+        delta: false,
+        from: start.point.y,
+        cos_from,
+        parallel: start.infinite,
+        length: 0,
+        eta: 1.0,
+        class: plan.settings.paths.light(),
+        first_delta: false,
+    };
+    let flux = start.weight.max_lane();
+    let o = offset_origin(start.point.y, start.point.y_error, if start.infinite { Vec3::ZERO } else { start.point.n_g }, start.w);
+    let mut ray = Ray { o, d: start.w, t_max: f32::INFINITY };
+    loop {
+        tally.rays.shoot += 1;
+        let Some(hit) = scene.geometry.intersect(&ray) else { return };
+        let surface = scene.geometry.surface(&ray, &hit);
+        let length = walk.length + 1;
+        let arrival = walk.arrive(&surface, ray.d);
+        tally.observe.arrived(&surface);
+        let vertex = Vertex::new(scene, surface, -ray.d);
+        let count = if walk.length == 0 {
+            if plan.settings.techniques.next_event {
+                scene.lights.density_next_event(&scene.geometry, surface.p, &start.point, -ray.d) / d.p_k
+            } else {
+                0.0
+            }
+        } else if walk.delta {
+            0.0
+        } else {
+            plan.c
+        };
+        let partial = walk.partial(h, arrival, count);
+        if !vertex.closure.is_delta() {
+            if plan.settings.techniques.splat {
+                splat(cx, &walk, &vertex, partial, start.delta, random, tally);
+            }
+            if let Some(cache) = cache.as_mut()
+                && length + 2 <= plan.settings.max_length
+            {
+                cache.push(LightVertex {
+                    surface,
+                    w_back: vertex.w_back,
+                    throughput: walk.throughput,
+                    partial,
+                    length,
+                    class: walk.class,
+                    first_delta: walk.first_delta,
+                    light_delta: start.delta,
+                });
+                if let Some(v) = cache.last() {
+                    tally.observe.cached(v);
+                }
+            }
+        }
+        // The next vertex would end paths of at least length + 2 edges.
+        if length + 2 > plan.settings.max_length {
+            return;
+        }
+        let (u_lobe, u) = (random.unit(), random.unit2());
+        let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
+        tally.observe.scattered(&s);
+        walk.leave(cx, &vertex, partial, &s);
+        // Radiance is scaled by η² across a boundary, flux is not: roulette looks at flux.
+        walk.eta = 1.0;
+        walk.classify(&plan.settings.paths, EQUATION, s.delta);
+        if !walk.survives(plan, flux, random) {
+            return;
+        }
+        ray = spawn(&vertex.surface, s.w_next);
+    }
+}
+
+/// The lens sees `vertex`.
+#[inline]
+fn splat<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    vertex: &Vertex,
+    partial: Partial<f32>,
+    light_delta: bool,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let u_lens = random.unit2();
+    let length = walk.length + 2;
+    if !plan.wants_length(length) {
+        return;
+    }
+    let Some(c) = scene.sensor.connect(vertex.surface.p, u_lens) else { return };
+    let Some(k) = vertex.kernel(EQUATION, c.w) else { return };
+    let h = plan.settings.heuristic;
+    let g1 = c.g_dir * k.cos_g * c.inv_d2;
+    let weight = mis::splat(h, plan.n, g1, partial.at(h, k.p_w_rev));
+    let value = walk.throughput * k.value * (c.inv_d2 * c.g_dir * plan.inv_light_paths * weight);
+    if value.is_black() {
+        return;
+    }
+    tally.rays.shadow += 1;
+    if !scene.geometry.visible(end(&vertex.surface), free(c.end)) {
+        return;
+    }
+    let ends =
+        PathEnds { length, first_delta: false, last_delta: walk.length > 0 && walk.first_delta, light_delta };
+    let from_light = plan.settings.paths.backward(walk.class, Symbol::D);
+    finish(cx, from_light, ends, c, value, (weight, walk.length + 2), random, tally);
+}
+
+/// The lens sees a light point: paths of length 1 where hits are off.
+#[inline]
+fn splat_emitter<R: Record, O: Observe>(cx: Context<'_>, random: &mut Random, tally: &mut Tally<'_, R, O>) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let (u_pick, u, u_lens) = (random.unit(), random.unit2(), random.unit2());
+    let Some((point, p_k)) = scene.lights.sample_point(&scene.geometry, u_pick, u) else { return };
+    let infinite = scene.lights.is_infinite(point.emitter);
+    let c = if infinite { scene.sensor.connect_infinite(point.n_g, u_lens) } else { scene.sensor.connect(point.y, u_lens) };
+    let Some(c) = c else { return };
+    let radiance = scene.lights.radiance(&point, c.w);
+    let cos = if infinite { 1.0 } else { point.n_g.dot(c.w).abs() };
+    let value = radiance * (c.g_dir * cos * c.inv_d2 / p_k * plan.inv_light_paths);
+    if value.is_black() {
+        return;
+    }
+    tally.rays.shadow += 1;
+    let visible = if infinite {
+        scene.geometry.visible_infinite(free(c.end), -point.n_g)
+    } else {
+        scene.geometry.visible((point.y, point.y_error, point.n_g), free(c.end))
+    };
+    if !visible {
+        return;
+    }
+    let ends = PathEnds { length: 1, first_delta: false, last_delta: false, light_delta: false };
+    finish(cx, plan.settings.paths.light(), ends, c, value, (1.0, 1), random, tally);
+}
+
+/// Hands on a finished path if it counts.
+#[inline]
+fn finish<R: Record, O: Observe>(
+    cx: Context<'_>,
+    from_light: u64,
+    ends: PathEnds,
+    c: SensorConnection,
+    value: Spectrum,
+    (weight, light_vertices): (f32, u32),
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let paths = &cx.plan.settings.paths;
+    if paths.accepts(paths.eye(), from_light, ends) {
+        let technique = Technique::Splat;
+        tally.record.splatted(c.raster, random, Contribution { value, length: ends.length, light_vertices, technique });
+        tally.observe.joined(Join {
+            technique,
+            weight,
+            length: ends.length,
+            light: None,
+            light_delta: ends.light_delta,
+            light_vertex: 0,
+            lens: c.end,
+        });
+    }
+}

@@ -1,0 +1,145 @@
+//! A path vertex and the one kernel of both equations.
+//!
+//! ```text
+//! kernel(w_i, w_o) = f(w_i, w_o) · |w_i·n_s| / |w_i·n_g|
+//! ```
+//!
+//! projected with the geometric cosine of the side that is sampled. Gathering (w_i is the next
+//! direction) this is the plain `f |w_next·n_s|`; shooting (w_i is the direction back) it is the
+//! adjoint correction of shading normals [Veach 1997, p. 155]. A pair of directions on which shading
+//! and geometric normal disagree about the side scatters nothing, for both walkers alike.
+
+use super::mutant::{Mutant, planted};
+use crate::local::{Closure, Equation};
+use crate::math::Frame;
+use crate::scene::{Scene, Surface};
+use crate::spectrum::Spectrum;
+use glam::Vec3;
+
+/// A surface point with its local model resolved for the direction it was reached from.
+pub struct Vertex {
+    /// The point.
+    pub surface: Surface,
+    /// Local coordinates around n_s.
+    pub frame: Frame,
+    /// The local model as numbers.
+    pub closure: Closure,
+    /// Unit direction to the predecessor, world.
+    pub w_back: Vec3,
+    /// The same in local coordinates.
+    pub back: Vec3,
+    /// `w_back · n_g`, signed.
+    pub cos_g_back: f32,
+}
+
+/// The kernel towards one direction, with what the weights need.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel {
+    /// `f · |w_i·n_s|/|w_i·n_g| · |w_next·n_g|`.
+    pub value: Spectrum,
+    /// Density per steradian of sampling `w_next`.
+    pub p_w: f32,
+    /// Density per steradian of the other walker sampling `w_back`.
+    pub p_w_rev: f32,
+    /// `|w_next · n_g|`.
+    pub cos_g: f32,
+}
+
+/// A sampled direction, kernel and cosines included.
+#[derive(Clone, Copy, Debug)]
+pub struct Scatter {
+    /// Unit direction, world.
+    pub w_next: Vec3,
+    /// Factor on the throughput.
+    pub weight: Spectrum,
+    /// Density per steradian, or probability of the lobe of a Dirac event.
+    pub p: f32,
+    /// The same for the other walker.
+    pub p_rev: f32,
+    /// `|w_next · n_g|`.
+    pub cos_g: f32,
+    /// A Dirac event.
+    pub delta: bool,
+    /// Ratio of the Dirac functions, see [`crate::local::Sample::dirac_ratio`].
+    pub dirac_ratio: f32,
+    /// Refractive index on the side of `w_next` over that on the side of `w_back`.
+    pub eta: f32,
+}
+
+impl Vertex {
+    /// Resolves the local model at `surface` for the unit direction `w_back`.
+    #[inline]
+    pub fn new(scene: &Scene, surface: Surface, w_back: Vec3) -> Self {
+        let frame = if scene.materials.needs_tangent(surface.material) {
+            Frame::with_tangent(surface.n_s, surface.dp_du)
+        } else {
+            Frame::around(surface.n_s)
+        };
+        let back = frame.to_local(w_back);
+        let closure = scene.materials.resolve(surface.material, surface.uv, back.z > 0.0);
+        Self { surface, frame, closure, w_back, back, cos_g_back: w_back.dot(surface.n_g) }
+    }
+
+    /// Whether shading and geometric normal agree about the sides of both directions.
+    #[inline]
+    fn sides_agree(&self, next: Vec3, cos_g_next: f32) -> bool {
+        self.back.z * self.cos_g_back > 0.0 && next.z * cos_g_next > 0.0
+    }
+
+    /// `|w_i·n_s|/|w_i·n_g| · |w_next·n_g|`, what multiplies f.
+    #[inline]
+    fn projection(&self, equation: Equation, next: Vec3, cos_g_next: f32) -> f32 {
+        match equation {
+            Equation::Rendering => next.z.abs(),
+            Equation::Potential if planted(Mutant::AdjointShadingNormal) => next.z.abs(),
+            Equation::Potential => (self.back.z * cos_g_next / self.cos_g_back).abs(),
+        }
+    }
+
+    /// The kernel towards unit `w_next`, `None` where it is zero. Non-Dirac part.
+    #[inline]
+    pub fn kernel(&self, equation: Equation, w_next: Vec3) -> Option<Kernel> {
+        let next = self.frame.to_local(w_next);
+        let cos_g = w_next.dot(self.surface.n_g);
+        if !self.sides_agree(next, cos_g) {
+            return None;
+        }
+        let e = self.closure.evaluate(equation, self.back, next);
+        if e.f.is_black() {
+            return None;
+        }
+        let value = e.f * self.projection(equation, next, cos_g);
+        Some(Kernel { value, p_w: e.p_w, p_w_rev: e.p_w_rev, cos_g: cos_g.abs() })
+    }
+
+    /// Samples the next direction.
+    #[inline]
+    pub fn scatter(&self, equation: Equation, u_lobe: f32, u: glam::Vec2) -> Option<Scatter> {
+        let s = self.closure.sample(equation, self.back, u_lobe, u)?;
+        // Straight through: the direction must not pick up rounding, nor be subject to sides.
+        let straight = s.delta && s.w_next == -self.back;
+        let w_next = if straight { -self.w_back } else { self.frame.to_world(s.w_next) };
+        let cos_g = w_next.dot(self.surface.n_g);
+        if !straight && !self.sides_agree(s.w_next, cos_g) {
+            return None;
+        }
+        let mut weight = s.weight;
+        if equation == Equation::Potential && !straight {
+            let next_z = s.w_next.z.abs();
+            weight *= self.projection(equation, s.w_next, cos_g) / next_z;
+        }
+        if planted(Mutant::RefractionEtaSquared) && s.delta && equation == Equation::Rendering {
+            weight *= s.eta * s.eta;
+        }
+        Some(Scatter {
+            w_next,
+            weight,
+            p: s.p,
+            p_rev: s.p_rev,
+            cos_g: cos_g.abs(),
+            delta: s.delta,
+            dirac_ratio: s.dirac_ratio,
+            eta: s.eta,
+        })
+    }
+}

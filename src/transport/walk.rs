@@ -1,0 +1,207 @@
+//! One step of either walker: what a walk carries from vertex to vertex.
+//!
+//! A step is an application of τ or τ': arrive at a surface, turn the density of the direction into
+//! one of area, scatter, survive roulette. Both equations share every line of it; what differs is
+//! how a walk starts (`gather`, `shoot`) and which joins it offers.
+
+use super::cache::LightVertex;
+use super::class::{PathFilter, Positions, Symbol};
+use super::mis::{Heuristic, Partial};
+use super::mutant::{Mutant, planted};
+use super::settings::Plan;
+use super::vertex::{Scatter, Vertex};
+use super::{RayCounts, Technique};
+use crate::local::Equation;
+use crate::math::Random;
+use crate::scene::emitter::{EmitterPoint, NextEvent};
+use crate::scene::geometry::{End, Ray, offset_origin};
+use crate::scene::{Scene, Surface};
+use crate::spectrum::Spectrum;
+use glam::Vec3;
+
+/// What a walk needs to know of the world around it.
+#[derive(Clone, Copy)]
+pub struct Context<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Which joins, how many.
+    pub plan: &'a Plan,
+}
+
+/// State of a walk on its way from one vertex to the next.
+#[derive(Clone, Debug)]
+pub struct Walk {
+    /// Product of kernels over densities, roulette included.
+    pub throughput: Spectrum,
+    /// MIS sum of the vertex that was left, resolved for the direction taken (already raised).
+    pub k: f32,
+    /// Density per steradian of the direction taken (first edge: see the walkers), or the
+    /// probability of the lobe where it is a Dirac event.
+    pub p: f32,
+    /// The vertex that was left scattered by a Dirac event.
+    pub delta: bool,
+    /// Position of the vertex that was left.
+    pub from: Vec3,
+    /// Its geometric cosine towards the direction taken; 1 for a light at infinity.
+    pub cos_from: f32,
+    /// The edge under way has no inverse square (light or sensor at infinity).
+    pub parallel: bool,
+    /// Edges walked.
+    pub length: u32,
+    /// Product of relative refractive indices.
+    pub eta: f32,
+    /// Positions of the path expression reached so far.
+    pub class: Positions,
+    /// The first scattering event was a Dirac event.
+    pub first_delta: bool,
+}
+
+/// What arrival at a surface adds.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// 1/d², or 1 on a parallel edge.
+    pub inv_d2: f32,
+    /// Density per m² with which the walk made the point.
+    pub p_a: f32,
+}
+
+/// Area densities are kept within these bounds so that no product over- or underflows.
+const DENSITY_RANGE: std::ops::RangeInclusive<f32> = 1e-30..=1e30;
+
+impl Walk {
+    /// Density and inverse square of arrival at `surface` along unit `d`.
+    #[inline]
+    pub fn arrive(&self, surface: &Surface, d: Vec3) -> Arrival {
+        let inv_d2 = if self.parallel { 1.0 } else { 1.0 / (surface.p - self.from).length_squared().max(1e-30) };
+        let cos = if planted(Mutant::AreaCosine) { 1.0 } else { d.dot(surface.n_g).abs() };
+        let p_a = (self.p * cos * inv_d2).clamp(*DENSITY_RANGE.start(), *DENSITY_RANGE.end());
+        Arrival { inv_d2, p_a }
+    }
+
+    /// MIS sum of the vertex arrived at; `count` joins could have made the edge.
+    #[inline]
+    pub fn partial(&self, h: Heuristic, arrival: Arrival, count: f32) -> Partial<f32> {
+        Partial::arrive(h, count, arrival.p_a, self.cos_from * arrival.inv_d2, self.k)
+    }
+
+    /// Leaves `vertex` along a sampled direction.
+    #[inline]
+    pub fn leave(&mut self, cx: Context<'_>, vertex: &Vertex, partial: Partial<f32>, s: &Scatter) {
+        let h = cx.plan.settings.heuristic;
+        self.throughput *= s.weight;
+        self.k = if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
+        self.p = s.p;
+        self.delta = s.delta;
+        self.from = vertex.surface.p;
+        self.cos_from = s.cos_g;
+        self.parallel = false;
+        self.length += 1;
+        self.eta *= s.eta;
+        if self.length == 1 {
+            self.first_delta = s.delta;
+        }
+    }
+
+    /// Follows the path expression over the event just sampled, from the eye or from the light.
+    #[inline]
+    pub fn classify(&mut self, filter: &PathFilter, equation: Equation, delta: bool) {
+        self.class = match equation {
+            Equation::Rendering => filter.forward(self.class, Symbol::event(delta)),
+            Equation::Potential => filter.backward(self.class, Symbol::event(delta)),
+        };
+    }
+
+    /// Russian roulette on the throughput relative to `start`; false ends the walk. Survival
+    /// probabilities depend on the history of the walk, so they stay out of the MIS densities.
+    #[inline]
+    pub fn survives(&mut self, plan: &Plan, start: f32, random: &mut Random) -> bool {
+        let t = self.throughput.max_lane();
+        if t.is_nan() || t <= 0.0 {
+            return false;
+        }
+        if self.length < plan.settings.rr_depth {
+            return true;
+        }
+        let q = (t * self.eta * self.eta / start).min(0.95);
+        if random.unit() >= q {
+            return false;
+        }
+        if !planted(Mutant::RouletteFactor) {
+            self.throughput /= q;
+        }
+        true
+    }
+}
+
+/// The ray that leaves a vertex along unit `w`.
+#[inline]
+pub fn spawn(surface: &Surface, w: Vec3) -> Ray {
+    Ray { o: offset_origin(surface.p, surface.p_error, surface.n_g, w), d: w, t_max: f32::INFINITY }
+}
+
+/// An end of a shadow segment on a surface.
+#[inline]
+pub fn end(s: &Surface) -> End {
+    (s.p, s.p_error, s.n_g)
+}
+
+/// An end of a shadow segment that is on no surface.
+#[inline]
+pub fn free(p: Vec3) -> End {
+    (p, 0.0, Vec3::ZERO)
+}
+
+/// Whether nothing stands between `x` and a light point.
+#[inline]
+pub fn sees_light(scene: &Scene, x: &Surface, ne: &NextEvent) -> bool {
+    if ne.distance.is_infinite() {
+        return scene.geometry.visible_infinite(end(x), ne.w);
+    }
+    // A point light has no normal and stays where it is.
+    scene.geometry.visible(end(x), (ne.point.y, ne.point.y_error, ne.point.n_g))
+}
+
+/// A join as an observer sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Join<'a> {
+    /// Which.
+    pub technique: Technique,
+    /// Its MIS weight.
+    pub weight: f32,
+    /// Edges of the whole path.
+    pub length: u32,
+    /// The light point, where the join made or found it.
+    pub light: Option<&'a EmitterPoint>,
+    /// That light point cannot be hit.
+    pub light_delta: bool,
+    /// Index in the cache of the light vertex of a connection.
+    pub light_vertex: usize,
+    /// The lens point of a splat.
+    pub lens: Vec3,
+}
+
+/// Watches a walk without taking part in it: tests rebuild whole paths from what they see.
+/// The unit type watches nothing and costs nothing.
+pub trait Observe {
+    /// A walk starts: at a lens point, or at a light point (true: one that cannot be hit).
+    fn started(&mut self, _from: Vec3, _light: Option<(&EmitterPoint, bool)>) {}
+    /// A vertex was reached.
+    fn arrived(&mut self, _surface: &Surface) {}
+    /// A light vertex went into the cache.
+    fn cached(&mut self, _vertex: &LightVertex) {}
+    /// The vertex last reached scattered.
+    fn scattered(&mut self, _s: &Scatter) {}
+    /// A path was finished.
+    fn joined(&mut self, _join: Join<'_>) {}
+}
+impl Observe for () {}
+
+/// Who watches and who counts, handed down a walk together.
+pub struct Tally<'a, R, O> {
+    /// Receives contributions.
+    pub record: &'a mut R,
+    /// Counts rays.
+    pub rays: &'a mut RayCounts,
+    /// Watches.
+    pub observe: &'a mut O,
+}

@@ -1,0 +1,11 @@
+//! Tests that prove the physics: every join alone against every other, weights against their
+//! definition, furnaces, closed forms, and planted mistakes that must be caught.
+
+mod agreement;
+mod determinism;
+mod furnace;
+mod mutants;
+mod scenes;
+mod splats;
+mod support;
+mod weights;

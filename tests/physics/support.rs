@@ -1,0 +1,113 @@
+//! Scenes from text, and block values of independent renders straight from the walks.
+
+use glam::Vec2;
+use nephroid::math::Random;
+use nephroid::math::random::Family;
+use nephroid::report::agreement::BlockSeries;
+use nephroid::scene::Scene;
+use nephroid::transport::cache::{LightCache, LightVertex};
+use nephroid::transport::gather::gather;
+use nephroid::transport::settings::{Plan, Settings};
+use nephroid::transport::shoot::shoot;
+use nephroid::transport::walk::{Context, Tally};
+use nephroid::transport::{Contribution, RayCounts, Record};
+use rayon::prelude::*;
+
+/// Side of a block in pixels.
+pub const BLOCK: u32 = 16;
+
+/// A seed for all statistical tests; CI leaves it alone.
+pub fn seed() -> u64 {
+    std::env::var("NEPHROID_TEST_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1)
+}
+
+/// The built scene of a text.
+pub fn scene(xml: &str) -> Scene {
+    nephroid::load_str(xml, std::path::Path::new("."))
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Sums of one render by path length and block.
+struct Blocks {
+    crop: [u32; 4],
+    columns: usize,
+    sums: Vec<Vec<f64>>,
+    at: (u32, u32),
+}
+
+impl Blocks {
+    fn add(&mut self, x: i64, y: i64, c: &Contribution) {
+        let (x, y) = (x - i64::from(self.crop[0]), y - i64::from(self.crop[1]));
+        if x < 0 || y < 0 || x >= i64::from(self.crop[2]) || y >= i64::from(self.crop[3]) {
+            return;
+        }
+        let block = (y as usize / BLOCK as usize) * self.columns + x as usize / BLOCK as usize;
+        assert!(c.value.is_finite(), "a contribution is not finite: {c:?}");
+        if let Some(sums) = self.sums.get_mut(c.length as usize) {
+            sums[block] += f64::from(c.value.mean());
+        }
+    }
+}
+
+impl Record for Blocks {
+    fn gathered(&mut self, c: Contribution) {
+        self.add(i64::from(self.at.0), i64::from(self.at.1), &c);
+    }
+    fn splatted(&mut self, raster: Vec2, _: &mut Random, c: Contribution) {
+        self.add(raster.x.floor() as i64, raster.y.floor() as i64, &c);
+    }
+}
+
+/// How much to render.
+#[derive(Clone, Copy)]
+pub struct Effort {
+    pub renders: u64,
+    pub passes: u64,
+    pub max_length: u32,
+}
+
+/// Block values by path length (index = length) of independent renders; the scene's box filter is
+/// assumed. Seeds differ between series so that both sides of a comparison are independent.
+pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSeries> {
+    let film = &scene.film;
+    let crop = film.crop.unwrap_or([0, 0, film.width, film.height]);
+    let (columns, rows) = (crop[2].div_ceil(BLOCK) as usize, crop[3].div_ceil(BLOCK) as usize);
+    let mut settings = settings.clone();
+    settings.max_length = settings.max_length.min(effort.max_length);
+    // Any constant is a valid number of vertices for the weights.
+    let plan = Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0);
+    let cx = Context { scene, plan: &plan };
+    let renders: Vec<Vec<Vec<f64>>> = (0..effort.renders)
+        .into_par_iter()
+        .map(|render| {
+            let sums = vec![vec![0.0; columns * rows]; effort.max_length as usize + 1];
+            let mut blocks = Blocks { crop, columns, sums, at: (0, 0) };
+            let mut rays = RayCounts::default();
+            let mut tally = Tally { record: &mut blocks, rays: &mut rays, observe: &mut () };
+            for pass in render * effort.passes..(render + 1) * effort.passes {
+                let mut vertices: Vec<LightVertex> = Vec::new();
+                for index in 0..plan.light_paths {
+                    let mut random = Random::new(Family::Shoot, u64::from(index), pass, settings.seed);
+                    shoot(cx, if plan.c > 0.0 { Some(&mut vertices) } else { None }, &mut random, &mut tally);
+                }
+                if !settings.techniques.gathers() {
+                    continue;
+                }
+                let cache = LightCache::new(vec![vertices]);
+                for y in crop[1]..crop[1] + crop[3] {
+                    for x in crop[0]..crop[0] + crop[2] {
+                        let id = u64::from(y) * u64::from(film.width) + u64::from(x);
+                        let mut random = Random::new(Family::Gather, id, pass, settings.seed);
+                        tally.record.at = (x, y);
+                        let raster = Vec2::new(x as f32, y as f32) + random.unit2();
+                        gather(cx, raster, 1.0, &cache, &mut random, &mut tally);
+                    }
+                }
+            }
+            blocks.sums
+        })
+        .collect();
+    (0..=effort.max_length as usize)
+        .map(|k| BlockSeries { columns, rows, draws: renders.iter().map(|r| r[k].clone()).collect() })
+        .collect()
+}

@@ -1,0 +1,147 @@
+//! MIS weights: the recursion against the definition, on random numbers and on the walks' own paths.
+
+use crate::scenes;
+use crate::support::{scene, seed};
+use glam::Vec2;
+use nephroid::math::Random;
+use nephroid::math::random::Family;
+use nephroid::transport::cache::LightCache;
+use nephroid::transport::gather::gather;
+use nephroid::transport::mis::Heuristic;
+use nephroid::transport::reference::{Densities, Testimony, Witness, weights, weights_by_recursion};
+use nephroid::transport::settings::{Plan, Settings, Techniques};
+use nephroid::transport::shoot::shoot;
+use nephroid::transport::walk::{Context, Tally};
+use nephroid::transport::{Contribution, RayCounts, Record};
+
+struct Nowhere;
+impl Record for Nowhere {
+    fn gathered(&mut self, _: Contribution) {}
+    fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
+}
+
+/// Random densities of a random path, as a brute-force oracle for the algebra.
+fn random_path(random: &mut Random) -> (Densities, Plan) {
+    let k = 2 + random.below(11) as usize;
+    let mut density = || (f64::from(random.unit()) * 8.0 - 4.0).exp();
+    let mut g: Vec<f64> = (0..=k).map(|_| density()).collect();
+    let s: Vec<f64> = (0..=k).map(|_| density()).collect();
+    let nu = density();
+    let delta: Vec<bool> = (0..=k).map(|i| i > 0 && i < k && random.unit() < 0.35).collect();
+    if random.unit() < 0.3 {
+        g[k] = 0.0;
+    }
+    let techniques = Techniques {
+        hit: random.unit() < 0.8,
+        next_event: random.unit() < 0.8,
+        splat: random.unit() < 0.8,
+        connect: random.unit() < 0.8,
+    };
+    let heuristic = if random.unit() < 0.5 { Heuristic::Balance } else { Heuristic::Power };
+    let connections = random.below(5);
+    let settings = Settings { techniques, heuristic, connections, ..Settings::default() };
+    let vertices = 0.5 + 3.0 * f64::from(random.unit());
+    (Densities { g, s, nu, delta }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
+}
+
+#[test]
+fn recursion_is_the_definition_for_100_000_random_paths() {
+    let mut random = Random::new(Family::Other, 7, 0, seed());
+    let mut tested = 0;
+    while tested < 100_000 {
+        let (d, plan) = random_path(&mut random);
+        let defined = weights(&d, &plan);
+        let total: f64 = defined.iter().map(|w| w.1).sum();
+        if total == 0.0 {
+            continue;
+        }
+        let recursive = weights_by_recursion(&d, &plan);
+        assert_eq!(defined.len(), recursive.len());
+        for ((key, a), (other, b)) in defined.iter().zip(&recursive) {
+            assert_eq!(key, other);
+            assert!((a - b).abs() < 1e-9, "{key:?}: {a} against {b} for {d:?}");
+        }
+        let sum: f64 = recursive.iter().map(|w| w.1).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "weights sum to {sum}");
+        tested += 1;
+    }
+}
+
+/// All joins that a few walks through a scene made, with their whole paths.
+fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scene::Scene, Plan, Vec<Testimony>) {
+    let world = scene(xml);
+    let film = world.film.clone();
+    let plan = Plan::new(settings, 64, film.width * film.height, 2.0);
+    let cx = Context { scene: &world, plan: &plan };
+    let (mut witness, mut rays) = (Witness::default(), RayCounts::default());
+    let crop = film.crop.unwrap_or([0, 0, film.width, film.height]);
+    for pass in 0.. {
+        witness.next_pass();
+        let mut tally = Tally { record: &mut Nowhere, rays: &mut rays, observe: &mut witness };
+        let mut vertices = Vec::new();
+        tally.observe.expect_shooting(true);
+        for i in 0..64 {
+            let mut random = Random::new(Family::Shoot, i, pass, seed());
+            shoot(cx, Some(&mut vertices), &mut random, &mut tally);
+        }
+        let cache = LightCache::new(vec![vertices]);
+        tally.observe.expect_shooting(false);
+        for i in 0..64 {
+            let mut random = Random::new(Family::Gather, i, pass, seed());
+            let at = Vec2::new(crop[0] as f32, crop[1] as f32);
+            let raster = at + random.unit2() * Vec2::new(crop[2] as f32, crop[3] as f32);
+            gather(cx, raster, 1.0, &cache, &mut random, &mut tally);
+        }
+        if witness.seen.len() >= wanted || pass > 4000 {
+            break;
+        }
+    }
+    drop(cx);
+    (world, plan, witness.seen)
+}
+
+fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize) -> usize {
+    let dir = tempfile::tempdir().unwrap();
+    let mut tested = 0;
+    for s in scenes::all(dir.path()) {
+        let (world, plan, seen) = testimonies(&s.xml, settings, per_scene);
+        let mut bad = Vec::new();
+        for t in &seen {
+            let all = t.path.weights(&world, &plan);
+            let sum: f64 = all.iter().map(|w| w.1).sum();
+            assert!((sum - 1.0).abs() < 1e-9, "{}: weights sum to {sum}", s.name);
+            let Some((_, w)) = all.iter().find(|w| w.0 == t.key) else {
+                bad.push(format!("{:?} is no join of its path {all:?}", t.key));
+                continue;
+            };
+            assert!(t.weight.is_finite());
+            let tolerance = 1e-3 * w.max(1e-6);
+            if *w > 1e-6 && (f64::from(t.weight) - w).abs() > tolerance {
+                bad.push(format!("{:?} k = {}: {} instead of {w}; all {all:?}", t.key, t.path.vertices.len() + 1, t.weight));
+            }
+        }
+        tested += seen.len();
+        // A grazing edge or a nearly coincident pair of vertices may lose digits in f32 positions.
+        assert!(bad.len() * 2000 <= seen.len(), "{}: {} of {} weights differ, e.g.\n{}", s.name, bad.len(), seen.len(), bad[..bad.len().min(5)].join("\n"));
+    }
+    tested
+}
+
+#[test]
+fn walks_use_the_defined_weights_on_100_000_paths_of_real_scenes() {
+    let settings = Settings { connections: 2, max_length: 8, ..Settings::default() };
+    assert!(walks_use_the_defined_weights(&settings, 8000) >= 100_000);
+}
+
+#[test]
+fn walks_use_the_defined_weights_with_the_power_heuristic_and_without_some_joins() {
+    for techniques in ["hit,nee,splat", "nee,splat,connect", "hit,splat", "nee,connect", "hit,connect"] {
+        let settings = Settings {
+            techniques: Techniques::parse(techniques).unwrap(),
+            heuristic: Heuristic::Power,
+            max_length: 7,
+            ..Settings::default()
+        };
+        walks_use_the_defined_weights(&settings, 1000);
+    }
+}
