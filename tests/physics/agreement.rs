@@ -133,6 +133,7 @@ scenes_agree! {
     image_sky: "image sky",
     thin_lens: "thin lens",
     crop_window: "crop window",
+    under_water: "under water",
     orthographic: "orthographic",
 }
 
@@ -140,4 +141,23 @@ scenes_agree! {
 fn power_heuristic_agrees() {
     combination_agrees("glass and mirror", Heuristic::Power);
     combination_agrees("sun disk", Heuristic::Power);
+}
+
+#[test]
+fn roulette_does_not_matter() {
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), "diffuse box"));
+    let mut failures = Vec::new();
+    for (i, techniques) in ["hit,nee", "splat"].into_iter().enumerate() {
+        let of = |rr_depth, seed| {
+            let s = Settings { rr_depth, ..settings(techniques, "", seed) };
+            series(&world, &s, EFFORT)
+        };
+        let seeds = seed() * 1000 + 900 + 2 * i as u64;
+        let (with, without) = (of(2, seeds), of(1000, seeds + 1));
+        for k in 2..=EFFORT.max_length as usize {
+            check(techniques, "with roulette against without", k, &agreement(&with[k], &without[k]), &mut failures, 8.0);
+        }
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }

@@ -4,7 +4,6 @@
 mod agreement;
 mod determinism;
 mod furnace;
-mod mutants;
 mod scenes;
 mod splats;
 mod support;

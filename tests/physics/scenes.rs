@@ -18,6 +18,13 @@ const THIN_LENS: &str = r#"<sensor type="thinlens"><float name="fov" value="40"/
 const ORTHOGRAPHIC: &str = r#"<sensor type="orthographic"><transform name="to_world"><scale value="1.3"/>
   <lookat origin="0.3, 0.25, 4.2" target="0, 0, 0" up="0, 1, 0"/></transform>FILM</sensor>"#;
 
+/// The sensor is below the surface, the light above.
+const UNDER_WATER: &str = r#"<sensor type="perspective"><float name="fov" value="75"/>
+  <transform name="to_world"><lookat origin="0.1, -0.3, 0.9" target="0, -0.6, -0.4" up="0, 1, 0"/></transform>FILM</sensor>"#;
+
+const WATER: &str = r#"<shape type="rectangle"><transform name="to_world"><scale x="3" y="3"/><rotate x="1" angle="-90"/><translate y="0.1"/></transform>
+  <bsdf type="dielectric"><float name="int_ior" value="1.33"/><float name="ext_ior" value="1"/></bsdf></shape>"#;
+
 const FILM: &str = r#"<film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="48"/><rfilter type="box"/></film>"#;
 
 const CROP: &str = r#"<film type="hdrfilm"><integer name="width" value="96"/><integer name="height" value="80"/>
@@ -136,6 +143,7 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
         scene("image sky", CAMERA, FILM, &[&sky, GLASS_AND_MIRROR]),
         scene("thin lens", THIN_LENS, FILM, &[CEILING, AREA, BLOCK]),
         scene("crop window", CAMERA, CROP, &[CEILING, AREA, BLOCK]),
+        scene("under water", UNDER_WATER, FILM, &[CEILING, AREA, WATER]),
         scene("orthographic", ORTHOGRAPHIC, FILM, &[CEILING, AREA, BLOCK]),
     ]
 }

@@ -1,0 +1,114 @@
+//! Planted mistakes: each must be caught by the physics test that is named beside it.
+//! Run with `cargo test --features mutants --test mutants`. A binary of its own, because a mistake
+//! is planted for the whole process.
+#![cfg(feature = "mutants")]
+
+#[path = "physics/scenes.rs"]
+#[allow(dead_code)]
+mod scenes;
+#[path = "physics/support.rs"]
+#[allow(dead_code)]
+mod support;
+
+use nephroid::report::agreement::agreement;
+use nephroid::transport::class::PathFilter;
+use nephroid::transport::mutant::{Mutant, plant};
+use nephroid::transport::settings::{Settings, Techniques};
+use support::{Effort, scene, seed, series};
+
+/// A comparison of two estimates of the same thing.
+struct Check {
+    mutant: Mutant,
+    /// The test of the physics suite that makes the same comparison.
+    named: &'static str,
+    scene: &'static str,
+    paths: &'static str,
+    a: (&'static str, u32),
+    b: (&'static str, u32),
+}
+
+const CHECKS: [Check; 6] = [
+    Check {
+        mutant: Mutant::AdjointShadingNormal,
+        named: "agreement::shading_normals::joins",
+        scene: "shading normals",
+        paths: "E (D | D .* D) L",
+        a: ("nee", 3),
+        b: ("splat", 3),
+    },
+    Check {
+        mutant: Mutant::RefractionEtaSquared,
+        named: "agreement::under_water::joins",
+        scene: "under water",
+        paths: "E D .* L",
+        a: ("hit", 3),
+        b: ("splat", 3),
+    },
+    Check {
+        mutant: Mutant::SplatCropNormalisation,
+        named: "agreement::crop_window::joins",
+        scene: "crop window",
+        paths: "E (D | D .* D) L",
+        a: ("nee", 3),
+        b: ("splat", 3),
+    },
+    Check {
+        mutant: Mutant::NextEventDensity,
+        named: "agreement::diffuse_box::joins",
+        scene: "diffuse box",
+        paths: "E .* D L",
+        a: ("hit", 3),
+        b: ("nee", 3),
+    },
+    Check {
+        mutant: Mutant::RouletteFactor,
+        named: "agreement::roulette_does_not_matter",
+        scene: "diffuse box",
+        paths: "E .* D L",
+        a: ("nee", 2),
+        b: ("nee", 100),
+    },
+    Check {
+        mutant: Mutant::AreaCosine,
+        named: "agreement::diffuse_box::combination",
+        scene: "diffuse box",
+        paths: "visible-to:gather",
+        a: ("nee", 3),
+        b: ("hit,nee,splat,connect", 3),
+    },
+];
+
+/// Smallest corrected p over path lengths 2 … 5.
+fn p_of(check: &Check) -> f64 {
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), check.scene));
+    let effort = Effort { renders: 40, passes: 3, max_length: 5 };
+    let run = |(techniques, rr_depth): (&str, u32), seed: u64| {
+        let settings = Settings {
+            techniques: Techniques::parse(techniques).unwrap(),
+            paths: PathFilter::parse(check.paths).unwrap(),
+            min_length: 2,
+            rr_depth,
+            connections: 2,
+            seed,
+            ..Settings::default()
+        };
+        series(&world, &settings, effort)
+    };
+    let (a, b) = (run(check.a, seed() * 77 + 1), run(check.b, seed() * 77 + 2));
+    (2..=5).map(|k| agreement(&a[k], &b[k]).p).fold(1.0, f64::min)
+}
+
+#[test]
+fn planted_mistakes_are_caught() {
+    for check in &CHECKS {
+        plant(None);
+        let sound = p_of(check);
+        plant(Some(check.mutant));
+        let mistaken = p_of(check);
+        plant(None);
+        println!("{:?}: p = {sound:.2e} without, {mistaken:.2e} with the mistake ({})", check.mutant, check.named);
+        assert!(sound > 1e-5, "{:?}: the sound estimators disagree, p = {sound:.2e}", check.mutant);
+        assert!(mistaken < 1e-5, "{:?}: {} does not notice, p = {mistaken:.2e}", check.mutant, check.named);
+    }
+}

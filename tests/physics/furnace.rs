@@ -1,0 +1,173 @@
+//! Constant radiance [theory A16]: with Lᵉ = (1 − a) L* on every surface of a closed scene, L = L*
+//! everywhere, whatever the geometry. Any energy that is lost or gained shows.
+
+use crate::support::{scene, seed};
+use nephroid::render::{Budget, Control, Estimator, Options, Render};
+use nephroid::report::agreement::sidak;
+use nephroid::scene::Scene;
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::path::Path;
+
+/// A bumpy sphere of 2 · 80 · 64 triangles without normals, as OBJ with texture coordinates.
+fn bumpy_mesh(path: &Path) {
+    use std::fmt::Write;
+    let (columns, rows) = (80, 64);
+    let mut obj = String::new();
+    for j in 0..=rows {
+        for i in 0..=columns {
+            let (u, v) = (f64::from(i) / f64::from(columns), f64::from(j) / f64::from(rows));
+            let (theta, phi) = (std::f64::consts::PI * (0.02 + 0.96 * v), std::f64::consts::TAU * u);
+            let r = 0.5 + 0.06 * (7.0 * phi).sin() * (5.0 * theta).sin();
+            let p = [r * theta.sin() * phi.cos(), r * theta.cos(), r * theta.sin() * phi.sin()];
+            let _ = writeln!(obj, "v {} {} {}\nvt {u} {v}", p[0], p[1], p[2]);
+        }
+    }
+    for j in 0..rows {
+        for i in 0..columns {
+            let at = |i: i32, j: i32| j * (columns + 1) + i + 1;
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let _ = writeln!(obj, "f {a}/{a} {b}/{b} {c}/{c}\nf {a}/{a} {c}/{c} {d}/{d}");
+        }
+    }
+    std::fs::write(path, obj).unwrap();
+}
+
+/// A grey image and its complement, so that emission is 1 − albedo texel by texel.
+fn complementary_textures(dir: &Path) {
+    let albedo = image::GrayImage::from_fn(16, 16, |x, y| image::Luma([(30 + 12 * x + 3 * (y % 5)) as u8]));
+    let emission = image::GrayImage::from_fn(16, 16, |x, y| image::Luma([255 - albedo.get_pixel(x, y).0[0]]));
+    albedo.save(dir.join("albedo.png")).unwrap();
+    emission.save(dir.join("emission.png")).unwrap();
+}
+
+/// Lambert box with a textured bumpy mesh, a dim mirror and lossless glass, all at L* = 1.
+fn furnace(dir: &Path) -> Scene {
+    bumpy_mesh(&dir.join("bumpy.obj"));
+    complementary_textures(dir);
+    let d = dir.display();
+    scene(&format!(
+        r#"<scene version="3.0.0">
+  <sensor type="perspective"><float name="fov" value="70"/>
+    <transform name="to_world"><lookat origin="0.1, 0.2, 0.9" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
+  <shape type="cube"><boolean name="flip_normals" value="true"/>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.4, 0.6"/></bsdf>
+    <emitter type="area"><rgb name="radiance" value="0.5, 0.6, 0.4"/></emitter></shape>
+  <shape type="obj"><string name="filename" value="{d}/bumpy.obj"/><boolean name="face_normals" value="true"/>
+    <transform name="to_world"><scale value="0.7"/><translate x="-0.4" y="-0.4" z="-0.3"/></transform>
+    <bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="{d}/albedo.png"/><boolean name="raw" value="true"/></texture></bsdf>
+    <emitter type="area"><texture type="bitmap" name="radiance"><string name="filename" value="{d}/emission.png"/><boolean name="raw" value="true"/></texture></emitter></shape>
+  <shape type="sphere"><point name="center" value="0.5, -0.5, -0.2"/><float name="radius" value="0.3"/>
+    <bsdf type="conductor"><string name="material" value="none"/><rgb name="specular_reflectance" value="0.8"/></bsdf>
+    <emitter type="area"><rgb name="radiance" value="0.2"/></emitter></shape>
+  <shape type="sphere"><point name="center" value="0.35, 0.45, -0.3"/><float name="radius" value="0.25"/>
+    <bsdf type="dielectric"/></shape>
+</scene>"#
+    ))
+}
+
+fn radiance_is_constant(world: &Scene, estimator: Estimator, passes: u64) {
+    let normal = Normal::new(0.0, 1.0).unwrap();
+    for s in 0..3 {
+        let mut options = Options::for_scene(world, estimator);
+        options.settings.seed = seed() + s;
+        let mut render = Render::new(world, &options).unwrap();
+        render.run(&Budget::passes(passes), |_| Control::Continue);
+        let picture = render.picture();
+        let mut smallest: f64 = 1.0;
+        for (m, v) in picture.mean.iter().zip(&picture.variance) {
+            for c in 0..3 {
+                let z = (f64::from(m[c]) - 1.0) / f64::from(v[c]).sqrt().max(1e-6);
+                smallest = smallest.min(2.0 * normal.cdf(-z.abs()));
+            }
+        }
+        let p = sidak(smallest, picture.mean.len() * 3);
+        assert!(p > 1e-4, "{estimator:?}, seed {s}: the most deviant pixel has p = {p:.2e}");
+        blocks_are_constant(&picture, estimator);
+    }
+}
+
+/// Means of 16 × 16 blocks within 3 standard errors wherever those are at most 0.5 %. Of the 12 block
+/// channels of a picture one may be beyond (0.27 % each).
+fn blocks_are_constant(picture: &nephroid::render::Picture, estimator: Estimator) {
+    let (w, side) = (picture.width as usize, 16);
+    let (mut tested, mut beyond, mut worst) = (0, 0, 0.0f64);
+    for by in (0..picture.height as usize).step_by(side) {
+        for bx in (0..w).step_by(side) {
+            for c in 0..3 {
+                let pixels = (by..by + side).flat_map(|y| (bx..bx + side).map(move |x| y * w + x));
+                let n = (side * side) as f64;
+                let (m, v) = pixels.fold((0.0, 0.0), |(m, v), i| {
+                    (m + f64::from(picture.mean[i][c]) / n, v + f64::from(picture.variance[i][c]) / (n * n))
+                });
+                if v.sqrt() <= 0.005 {
+                    tested += 1;
+                    let z = ((m - 1.0) / v.sqrt().max(1e-6)).abs();
+                    beyond += usize::from(z > 3.0);
+                    worst = worst.max(z);
+                }
+            }
+        }
+    }
+    assert!(tested > 0, "{estimator:?}: no block is precise enough to be tested");
+    assert!(beyond <= 1 && worst < 4.5, "{estimator:?}: {beyond} of {tested} blocks beyond 3 SE, worst {worst:.1}");
+}
+
+#[test]
+fn constant_radiance_by_gathering() {
+    let dir = tempfile::tempdir().unwrap();
+    radiance_is_constant(&furnace(dir.path()), Estimator::Gather, 256);
+}
+
+#[test]
+fn constant_radiance_by_both_walkers() {
+    let dir = tempfile::tempdir().unwrap();
+    radiance_is_constant(&furnace(dir.path()), Estimator::Bidirectional, 256);
+}
+
+/// A shooting walk sees no glass and no mirror directly; those pixels stay dark and are left out by
+/// looking only at what is diffuse: the same box without them.
+#[test]
+fn constant_radiance_by_shooting() {
+    let world = scene(
+        r#"<scene version="3.0.0">
+  <sensor type="perspective"><float name="fov" value="70"/>
+    <transform name="to_world"><lookat origin="0.1, 0.2, 0.9" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
+  <shape type="cube"><boolean name="flip_normals" value="true"/>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.4, 0.6"/></bsdf>
+    <emitter type="area"><rgb name="radiance" value="0.5, 0.6, 0.4"/></emitter></shape>
+  <shape type="sphere"><point name="center" value="-0.4, -0.5, -0.2"/><float name="radius" value="0.4"/>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.7"/></bsdf><emitter type="area"><rgb name="radiance" value="0.3"/></emitter></shape>
+</scene>"#,
+    );
+    radiance_is_constant(&world, Estimator::Shoot, 2048);
+}
+
+/// x = 0.1 x + 1.8 as a scene: every path of n scatterings returns the same number, so hits alone
+/// have no variance and D scatterings give 2(1 − 0.1^{D+1}).
+#[test]
+fn hits_alone_are_exact_in_a_lambert_box() {
+    let world = scene(
+        r#"<scene version="3.0.0">
+  <sensor type="perspective"><float name="fov" value="80"/>
+    <transform name="to_world"><lookat origin="0.3, 0.2, 0.5" target="-0.2, 0, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="16"/><rfilter type="box"/></film></sensor>
+  <shape type="cube"><boolean name="flip_normals" value="true"/>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.1"/></bsdf>
+    <emitter type="area"><rgb name="radiance" value="1.8"/></emitter></shape>
+</scene>"#,
+    );
+    for scatterings in 0..5u32 {
+        let mut options = Options::for_scene(&world, Estimator::Gather);
+        options.settings.techniques.next_event = false;
+        options.settings.rr_depth = 1000;
+        options.settings.max_length = scatterings + 1;
+        let mut render = Render::new(&world, &options).unwrap();
+        render.run(&Budget::passes(4), |_| Control::Continue);
+        let exact = 2.0 * (1.0 - 0.1f32.powi(scatterings as i32 + 1));
+        for m in render.picture().mean {
+            assert!((m[0] - exact).abs() < 1e-5, "{scatterings} scatterings: {} instead of {exact}", m[0]);
+        }
+    }
+}
