@@ -190,7 +190,7 @@ fn hit<R: Record, O: Observe>(
 fn next_event<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,
-    vertex: &Vertex,
+    vertex: &Vertex<'_>,
     partial: Partial<f32>,
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
@@ -239,7 +239,7 @@ fn next_event<R: Record, O: Observe>(
 fn connect<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,
-    vertex: &Vertex,
+    vertex: &Vertex<'_>,
     partial: Partial<f32>,
     lights: &LightCache,
     random: &mut Random,

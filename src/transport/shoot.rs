@@ -118,7 +118,7 @@ pub fn shoot<R: Record, O: Observe>(
 fn splat<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,
-    vertex: &Vertex,
+    vertex: &Vertex<'_>,
     partial: Partial<f32>,
     light_delta: bool,
     random: &mut Random,

@@ -17,13 +17,13 @@ use crate::spectrum::Spectrum;
 use glam::Vec3;
 
 /// A surface point with its local model resolved for the direction it was reached from.
-pub struct Vertex {
+pub struct Vertex<'a> {
     /// The point.
     pub surface: Surface,
     /// Local coordinates around n_s.
     pub frame: Frame,
     /// The local model as numbers.
-    pub closure: Closure,
+    pub closure: Closure<'a>,
     /// Unit direction to the predecessor, world.
     pub w_back: Vec3,
     /// The same in local coordinates.
@@ -66,10 +66,10 @@ pub struct Scatter {
     pub eta: f32,
 }
 
-impl Vertex {
+impl<'a> Vertex<'a> {
     /// Resolves the local model at `surface` for the unit direction `w_back`.
     #[inline]
-    pub fn new(scene: &Scene, surface: Surface, w_back: Vec3) -> Self {
+    pub fn new(scene: &'a Scene, surface: Surface, w_back: Vec3) -> Self {
         let frame = if scene.materials.needs_tangent(surface.material) {
             Frame::with_tangent(surface.n_s, surface.dp_du)
         } else {

@@ -86,7 +86,7 @@ impl Walk {
 
     /// Leaves `vertex` along a sampled direction.
     #[inline]
-    pub fn leave(&mut self, cx: Context<'_>, vertex: &Vertex, partial: Partial<f32>, s: &Scatter) {
+    pub fn leave(&mut self, cx: Context<'_>, vertex: &Vertex<'_>, partial: Partial<f32>, s: &Scatter) {
         let h = cx.plan.settings.heuristic;
         self.throughput *= s.weight;
         self.k = if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
