@@ -33,11 +33,7 @@ impl PixelMeasurement {
     /// cannot see is missing from its measurement, as it is from its image.
     pub fn new(scene: &Scene, options: &Options, (x, y): (u32, u32), samples: u64) -> Result<Self, RenderError> {
         let by = |e: Estimator| measure(scene, options, e, (x, y), samples);
-        Ok(Self {
-            gather: by(Estimator::Gather)?,
-            shoot: by(Estimator::Shoot)?,
-            bidirectional: by(Estimator::Bidirectional)?,
-        })
+        Ok(Self { gather: by(Estimator::Gather)?, shoot: by(Estimator::Shoot)?, bidirectional: by(Estimator::Bidirectional)? })
     }
 }
 

@@ -160,10 +160,7 @@ impl<'a> Render<'a> {
         let mut film = Film::new(crop[2], crop[3], Film::exponent_for(scene.radiance_scale()))?;
         let pool = match options.threads {
             Some(n) => Some(
-                rayon::ThreadPoolBuilder::new()
-                    .num_threads(n.max(1))
-                    .build()
-                    .map_err(|e| RenderError::Threads(e.to_string()))?,
+                rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build().map_err(|e| RenderError::Threads(e.to_string()))?,
             ),
             None => None,
         };

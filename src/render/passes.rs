@@ -157,4 +157,3 @@ fn gather_passes(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache,
     let added = render.film.add_passes(range);
     debug_assert!(added.is_ok());
 }
-

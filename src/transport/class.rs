@@ -24,9 +24,13 @@ pub struct PathFilter {
     text: String,
 }
 
-/// What a filter looks at when a path is finished, beside the sets of positions.
+/// A finished path as a filter sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct PathEnds {
+pub struct Finished {
+    /// Positions reached from the eye, up to the join.
+    pub from_eye: Positions,
+    /// Positions from which the light is reached, from the join on.
+    pub from_light: Positions,
     /// Length in edges.
     pub length: u32,
     /// The event next to the lens (v_1) is a Dirac event.
@@ -126,18 +130,18 @@ impl PathFilter {
         self.automaton.as_ref().map_or(0, |a| a.leaders(set) & a.matches[event as usize])
     }
 
-    /// Whether the path counts that joins a prefix reaching `from_eye` to a suffix from `from_light`.
+    /// Whether a finished path counts.
     #[inline]
-    pub fn accepts(&self, from_eye: Positions, from_light: Positions, ends: PathEnds) -> bool {
+    pub fn accepts(&self, path: &Finished) -> bool {
         if self.accepts_all() {
             return true;
         }
-        let gather = !ends.light_delta || (ends.length > 1 && !ends.last_delta);
-        let shoot = if ends.length == 1 { !ends.light_delta } else { !ends.first_delta };
+        let gather = !path.light_delta || (path.length > 1 && !path.last_delta);
+        let shoot = if path.length == 1 { !path.light_delta } else { !path.first_delta };
         if (self.visible_to.gather && !gather) || (self.visible_to.shoot && !shoot) {
             return false;
         }
-        self.automaton.as_ref().is_none_or(|a| a.followers(from_eye) & from_light != 0)
+        self.automaton.as_ref().is_none_or(|a| a.followers(path.from_eye) & path.from_light != 0)
     }
 }
 
@@ -205,11 +209,8 @@ impl<'a> Parser<'a> {
         while self.peek() == Some('|') {
             self.symbols.next();
             let other = self.sequence(depth)?;
-            part = Part {
-                nullable: part.nullable || other.nullable,
-                first: part.first | other.first,
-                last: part.last | other.last,
-            };
+            part =
+                Part { nullable: part.nullable || other.nullable, first: part.first | other.first, last: part.last | other.last };
         }
         Ok(part)
     }
@@ -261,7 +262,9 @@ impl<'a> Parser<'a> {
                     Err(format!("missing `)` in path expression `{}`", self.text))
                 };
             }
-            other => return Err(format!("unexpected `{other}` in path expression `{}` (known: E D S L . ( ) | * + ?)", self.text)),
+            other => {
+                return Err(format!("unexpected `{other}` in path expression `{}` (known: E D S L . ( ) | * + ?)", self.text));
+            }
         };
         let position = self.automaton.follow.len();
         if position >= 64 {
@@ -290,12 +293,18 @@ mod tests {
     fn accepts(expression: &str, path: &str) -> bool {
         let filter = PathFilter::parse(expression).unwrap();
         let events: Vec<Symbol> = path[1..path.len() - 1].chars().map(|c| Symbol::event(c == 'S')).collect();
-        let ends = PathEnds { length: events.len() as u32 + 1, first_delta: false, last_delta: false, light_delta: false };
         let verdicts: Vec<bool> = (0..=events.len())
             .map(|cut| {
                 let eye = events[..cut].iter().fold(filter.eye(), |s, e| filter.forward(s, *e));
                 let light = events[cut..].iter().rev().fold(filter.light(), |s, e| filter.backward(s, *e));
-                filter.accepts(eye, light, ends)
+                filter.accepts(&Finished {
+                    from_eye: eye,
+                    from_light: light,
+                    length: events.len() as u32 + 1,
+                    first_delta: false,
+                    last_delta: false,
+                    light_delta: false,
+                })
             })
             .collect();
         assert!(verdicts.iter().all(|v| *v == verdicts[0]), "{expression} on {path}: {verdicts:?}");
@@ -330,10 +339,12 @@ mod tests {
     #[test]
     fn visibility_follows_the_ends_of_a_path() {
         let both = PathFilter::parse("visible-to:gather,shoot").unwrap();
-        let ends = |length, first_delta, last_delta, light_delta| PathEnds { length, first_delta, last_delta, light_delta };
-        assert!(both.accepts(0, 0, ends(2, false, false, true)));
-        assert!(!both.accepts(0, 0, ends(3, false, true, true)));
-        assert!(both.accepts(0, 0, ends(3, false, true, false)));
-        assert!(!both.accepts(0, 0, ends(3, true, false, false)));
+        let sees = |length, first_delta, last_delta, light_delta| {
+            both.accepts(&Finished { from_eye: 0, from_light: 0, length, first_delta, last_delta, light_delta })
+        };
+        assert!(sees(2, false, false, true));
+        assert!(!sees(3, false, true, true));
+        assert!(sees(3, false, true, false));
+        assert!(!sees(3, true, false, false));
     }
 }

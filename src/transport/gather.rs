@@ -4,7 +4,7 @@
 //! it is the eye's half of bidirectional path tracing [Veach 1997, ch. 10].
 
 use super::cache::LightCache;
-use super::class::{PathEnds, Symbol};
+use super::class::{Finished, Symbol};
 use super::mis::{self, Partial};
 use super::mutant::{Mutant, planted};
 use super::vertex::Vertex;
@@ -97,15 +97,13 @@ pub fn gather<R: Record, O: Observe>(
 #[inline]
 fn finish<R: Record, O: Observe>(
     cx: Context<'_>,
-    from_light: u64,
-    from_eye: u64,
-    ends: PathEnds,
+    path: Finished,
     value: Spectrum,
     join: Join<'_>,
     light_vertices: u32,
     tally: &mut Tally<'_, R, O>,
 ) {
-    if cx.plan.settings.paths.accepts(from_eye, from_light, ends) {
+    if cx.plan.settings.paths.accepts(&path) {
         tally.record.gathered(Contribution { value, length: join.length, light_vertices, technique: join.technique });
         tally.observe.joined(join);
     }
@@ -171,7 +169,14 @@ fn hit<R: Record, O: Observe>(
         };
         mis::hit(plan.settings.heuristic, arrival.p_a, nu, e, walk.k)
     };
-    let ends = PathEnds { length, first_delta: walk.first_delta, last_delta: walk.delta, light_delta: false };
+    let path = Finished {
+        from_eye: walk.class,
+        from_light: plan.settings.paths.light(),
+        length,
+        first_delta: walk.first_delta,
+        last_delta: walk.delta,
+        light_delta: false,
+    };
     let value = walk.throughput * radiance * weight;
     let join = Join {
         technique: Technique::Hit,
@@ -182,7 +187,7 @@ fn hit<R: Record, O: Observe>(
         light_vertex: 0,
         lens: Vec3::ZERO,
     };
-    finish(cx, plan.settings.paths.light(), walk.class, ends, value, join, 0, tally);
+    finish(cx, path, value, join, 0, tally);
 }
 
 /// Picks a light point from `vertex`.
@@ -219,9 +224,14 @@ fn next_event<R: Record, O: Observe>(
     if !sees_light(scene, x, &ne) {
         return;
     }
-    let first_delta = walk.length > 0 && walk.first_delta;
-    let ends = PathEnds { length, first_delta, last_delta: false, light_delta: ne.delta };
-    let from_eye = plan.settings.paths.forward(walk.class, Symbol::D);
+    let path = Finished {
+        from_eye: plan.settings.paths.forward(walk.class, Symbol::D),
+        from_light: plan.settings.paths.light(),
+        length,
+        first_delta: walk.first_delta,
+        last_delta: false,
+        light_delta: ne.delta,
+    };
     let join = Join {
         technique: Technique::NextEvent,
         weight,
@@ -231,7 +241,7 @@ fn next_event<R: Record, O: Observe>(
         light_vertex: 0,
         lens: Vec3::ZERO,
     };
-    finish(cx, plan.settings.paths.light(), from_eye, ends, value, join, 1, tally);
+    finish(cx, path, value, join, 1, tally);
 }
 
 /// Joins `vertex` to light vertices picked uniformly from the cache.
@@ -286,14 +296,14 @@ fn connect<R: Record, O: Observe>(
         if !scene.geometry.visible(end(&vertex.surface), end(&y.surface)) {
             continue;
         }
-        let ends = PathEnds {
+        let path = Finished {
+            from_eye: plan.settings.paths.forward(walk.class, Symbol::D),
+            from_light: plan.settings.paths.backward(y.class, Symbol::D),
             length,
-            first_delta: walk.length > 0 && walk.first_delta,
-            last_delta: y.length > 1 && y.first_delta,
+            first_delta: walk.first_delta,
+            last_delta: y.first_delta,
             light_delta: y.light_delta,
         };
-        let paths = &plan.settings.paths;
-        let (from_eye, from_light) = (paths.forward(walk.class, Symbol::D), paths.backward(y.class, Symbol::D));
         let join = Join {
             technique: Technique::Connect,
             weight,
@@ -303,6 +313,6 @@ fn connect<R: Record, O: Observe>(
             light_vertex: picked as usize,
             lens: Vec3::ZERO,
         };
-        finish(cx, from_light, from_eye, ends, value, join, y.length + 1, tally);
+        finish(cx, path, value, join, y.length + 1, tally);
     }
 }

@@ -191,15 +191,27 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
     let mut gather = vec![mis::Partial { a: 0.0, b: 0.0 }; k];
     let mut shoot = gather.clone();
     let mut sum = 0.0;
-    for i in 1..k {
-        let count = if i == 1 { n } else if d.delta[i - 1] { 0.0 } else { c };
-        gather[i] = mis::Partial::arrive(h, count, d.g[i], 1.0, sum);
-        sum = resolve(gather[i], i, if i > 1 { d.s[i - 1] } else { 0.0 });
+    for (i, arrived) in gather.iter_mut().enumerate().skip(1) {
+        let count = if i == 1 {
+            n
+        } else if d.delta[i - 1] {
+            0.0
+        } else {
+            c
+        };
+        *arrived = mis::Partial::arrive(h, count, d.g[i], 1.0, sum);
+        sum = resolve(*arrived, i, if i > 1 { d.s[i - 1] } else { 0.0 });
     }
     let e = d.s[k] * d.s[k - 1];
     sum = if hit > 0.0 { 1.0 / h.raise(d.s[k]) } else { 0.0 };
     for i in (1..k).rev() {
-        let count = if i == k - 1 { nu / d.s[k] } else if d.delta[i + 1] { 0.0 } else { c };
+        let count = if i == k - 1 {
+            nu / d.s[k]
+        } else if d.delta[i + 1] {
+            0.0
+        } else {
+            c
+        };
         shoot[i] = mis::Partial::arrive(h, count, d.s[i], 1.0, sum);
         sum = resolve(shoot[i], i, d.g[i + 1]);
     }

@@ -149,8 +149,6 @@ impl Plan {
     /// Whether a finished path counts.
     #[inline]
     pub fn wants_length(&self, length: u32) -> bool {
-        length >= self.settings.min_length
-            && length <= self.settings.max_length
-            && !(length == 1 && self.settings.hide_emitters)
+        length >= self.settings.min_length && length <= self.settings.max_length && !(length == 1 && self.settings.hide_emitters)
     }
 }

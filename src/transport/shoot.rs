@@ -4,7 +4,7 @@
 //! cache that gathering walks connect to.
 
 use super::cache::LightVertex;
-use super::class::{PathEnds, Symbol};
+use super::class::{Finished, Symbol};
 use super::mis::{self, Partial};
 use super::vertex::Vertex;
 use super::walk::{Context, Join, Observe, Tally, Walk, end, free, spawn};
@@ -143,10 +143,15 @@ fn splat<R: Record, O: Observe>(
     if !scene.geometry.visible(end(&vertex.surface), free(c.end)) {
         return;
     }
-    let ends =
-        PathEnds { length, first_delta: false, last_delta: walk.length > 0 && walk.first_delta, light_delta };
-    let from_light = plan.settings.paths.backward(walk.class, Symbol::D);
-    finish(cx, from_light, ends, c, value, (weight, walk.length + 2), random, tally);
+    let path = Finished {
+        from_eye: plan.settings.paths.eye(),
+        from_light: plan.settings.paths.backward(walk.class, Symbol::D),
+        length,
+        first_delta: false,
+        last_delta: walk.first_delta,
+        light_delta,
+    };
+    finish(cx, path, c, value, weight, random, tally);
 }
 
 /// The lens sees a light point: paths of length 1 where hits are off.
@@ -173,32 +178,38 @@ fn splat_emitter<R: Record, O: Observe>(cx: Context<'_>, random: &mut Random, ta
     if !visible {
         return;
     }
-    let ends = PathEnds { length: 1, first_delta: false, last_delta: false, light_delta: false };
-    finish(cx, plan.settings.paths.light(), ends, c, value, (1.0, 1), random, tally);
+    let path = Finished {
+        from_eye: plan.settings.paths.eye(),
+        from_light: plan.settings.paths.light(),
+        length: 1,
+        first_delta: false,
+        last_delta: false,
+        light_delta: false,
+    };
+    finish(cx, path, c, value, 1.0, random, tally);
 }
 
 /// Hands on a finished path if it counts.
 #[inline]
 fn finish<R: Record, O: Observe>(
     cx: Context<'_>,
-    from_light: u64,
-    ends: PathEnds,
+    path: Finished,
     c: SensorConnection,
     value: Spectrum,
-    (weight, light_vertices): (f32, u32),
+    weight: f32,
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
-    let paths = &cx.plan.settings.paths;
-    if paths.accepts(paths.eye(), from_light, ends) {
-        let technique = Technique::Splat;
-        tally.record.splatted(c.raster, random, Contribution { value, length: ends.length, light_vertices, technique });
+    if cx.plan.settings.paths.accepts(&path) {
+        let (technique, length) = (Technique::Splat, path.length);
+        // The lens is the one vertex that shooting did not make.
+        tally.record.splatted(c.raster, random, Contribution { value, length, light_vertices: length, technique });
         tally.observe.joined(Join {
             technique,
             weight,
-            length: ends.length,
+            length,
             light: None,
-            light_delta: ends.light_delta,
+            light_delta: path.light_delta,
             light_vertex: 0,
             lens: c.end,
         });

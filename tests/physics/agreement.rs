@@ -13,8 +13,7 @@ const ALPHA: f64 = 1e-4;
 const EFFORT: Effort = Effort { renders: 40, passes: 3, max_length: 5 };
 
 /// A join, and the class of paths (k ≥ 2) that it can make.
-const JOINS: [(&str, &str); 4] =
-    [("hit", "E .+ L"), ("nee", "E .* D L"), ("splat", "E D .* L"), ("connect", "E .* D D .* L")];
+const JOINS: [(&str, &str); 4] = [("hit", "E .+ L"), ("nee", "E .* D L"), ("splat", "E D .* L"), ("connect", "E .* D D .* L")];
 
 fn settings(techniques: &str, paths: &str, seed: u64) -> Settings {
     Settings {
@@ -96,7 +95,8 @@ fn combination_agrees(name: &str, heuristic: Heuristic) {
         series(&world, &s, EFFORT)
     };
     for (i, (alone, walker)) in [("hit,nee", "visible-to:gather"), ("splat", "visible-to:shoot")].into_iter().enumerate() {
-        let (a, b) = (of(alone, walker, heuristic, 2 * i as u64), of("hit,nee,splat,connect", walker, heuristic, 2 * i as u64 + 1));
+        let (a, b) =
+            (of(alone, walker, heuristic, 2 * i as u64), of("hit,nee,splat,connect", walker, heuristic, 2 * i as u64 + 1));
         for k in 2..=EFFORT.max_length as usize {
             check(name, &format!("{alone} against all"), k, &agreement(&a[k], &b[k]), &mut failures, 8.0);
         }

@@ -25,7 +25,8 @@ const UNDER_WATER: &str = r#"<sensor type="perspective"><float name="fov" value=
 const WATER: &str = r#"<shape type="rectangle"><transform name="to_world"><scale x="3" y="3"/><rotate x="1" angle="-90"/><translate y="0.1"/></transform>
   <bsdf type="dielectric"><float name="int_ior" value="1.33"/><float name="ext_ior" value="1"/></bsdf></shape>"#;
 
-const FILM: &str = r#"<film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="48"/><rfilter type="box"/></film>"#;
+const FILM: &str =
+    r#"<film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="48"/><rfilter type="box"/></film>"#;
 
 const CROP: &str = r#"<film type="hdrfilm"><integer name="width" value="96"/><integer name="height" value="80"/>
   <integer name="crop_offset_x" value="37"/><integer name="crop_offset_y" value="21"/>

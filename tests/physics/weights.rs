@@ -122,7 +122,14 @@ fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize) -> usize
         }
         tested += seen.len();
         // A grazing edge or a nearly coincident pair of vertices may lose digits in f32 positions.
-        assert!(bad.len() * 2000 <= seen.len(), "{}: {} of {} weights differ, e.g.\n{}", s.name, bad.len(), seen.len(), bad[..bad.len().min(5)].join("\n"));
+        assert!(
+            bad.len() * 2000 <= seen.len(),
+            "{}: {} of {} weights differ, e.g.\n{}",
+            s.name,
+            bad.len(),
+            seen.len(),
+            bad[..bad.len().min(5)].join("\n")
+        );
     }
     tested
 }
