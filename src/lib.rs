@@ -29,3 +29,45 @@ pub mod scene;
 pub mod spectrum;
 pub mod texture;
 pub mod transport;
+
+use std::path::Path;
+
+/// A scene ready to render, and what may not be as meant.
+pub struct Loaded {
+    /// The built scene.
+    pub scene: scene::Scene,
+    /// Warnings; render them for people with [`describe::Problems::render`] and `sources`.
+    pub warnings: describe::Problems,
+    /// The texts that the places of the warnings point into.
+    pub sources: describe::Sources,
+}
+
+/// Reads, decodes and builds a Mitsuba 3 scene file; all problems at once on failure.
+pub fn load(path: &Path, options: &io::mitsuba::LoadOptions) -> Result<Loaded, io::mitsuba::LoadError> {
+    finish(io::mitsuba::load(path, options)?)
+}
+
+/// The same from a text; relative file names in it start at `directory`.
+pub fn load_str(text: &str, directory: &Path, options: &io::mitsuba::LoadOptions) -> Result<Loaded, io::mitsuba::LoadError> {
+    finish(io::mitsuba::from_str(text, directory, options)?)
+}
+
+/// Decodes the files that a description names and builds its first sensor's scene.
+pub fn finish(read: io::mitsuba::Loaded) -> Result<Loaded, io::mitsuba::LoadError> {
+    let (mut description, mut warnings) = (read.scene, read.warnings);
+    io::assets::decode(&mut description, &mut warnings);
+    let sources = std::mem::take(&mut description.sources);
+    if warnings.has_errors() {
+        return Err(io::mitsuba::LoadError { problems: warnings, sources });
+    }
+    match scene::Scene::build(&description, 0) {
+        Ok((scene, more)) => {
+            warnings.list.extend(more.list);
+            Ok(Loaded { scene, warnings, sources })
+        }
+        Err(problems) => {
+            warnings.list.extend(problems.list);
+            Err(io::mitsuba::LoadError { problems: warnings, sources })
+        }
+    }
+}

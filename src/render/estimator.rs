@@ -96,3 +96,11 @@ impl Options {
         h.finalize().into()
     }
 }
+
+/// About the mean radiance of the scene: its power spread over the sphere around it. Only the grid
+/// of the film depends on it.
+pub(super) fn radiance_scale(scene: &Scene) -> f32 {
+    let power: f32 = scene.lights.infos().iter().map(|e| e.power.iter().sum::<f32>() / 3.0).sum();
+    let radius = scene.lights.sphere().1;
+    power / (4.0 * std::f32::consts::PI * std::f32::consts::PI * radius * radius)
+}

@@ -157,7 +157,7 @@ impl<'a> Render<'a> {
         let d = &scene.film;
         let crop = options.crop.or(d.crop).unwrap_or([0, 0, d.width, d.height]);
         let filter = Filter::new(d.filter).ok_or(RenderError::Filter)?;
-        let mut film = Film::new(crop[2], crop[3], Film::exponent_for(scene.radiance_scale()))?;
+        let mut film = Film::new(crop[2], crop[3], Film::exponent_for(estimator::radiance_scale(scene)))?;
         let pool = match options.threads {
             Some(n) => Some(
                 rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build().map_err(|e| RenderError::Threads(e.to_string()))?,

@@ -23,7 +23,7 @@ pub fn seed() -> u64 {
 
 /// The built scene of a text.
 pub fn scene(xml: &str) -> Scene {
-    nephroid::load_str(xml, std::path::Path::new(".")).unwrap_or_else(|e| panic!("{e}"))
+    nephroid::load_str(xml, std::path::Path::new("."), &Default::default()).map(|l| l.scene).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Sums of one render by path length and block.

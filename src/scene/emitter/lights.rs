@@ -263,6 +263,12 @@ impl Lights {
         !self.skies.is_empty()
     }
 
+    /// Its light comes from infinitely far away.
+    #[inline]
+    pub fn is_infinite(&self, emitter: EmitterId) -> bool {
+        matches!(self.emitters.get(emitter.0 as usize), Some(Emitter::Parallel(_) | Emitter::Sky(_)))
+    }
+
     /// The emitter is a point, a spot or parallel light: no walk can hit it.
     pub fn is_delta(&self, emitter: EmitterId) -> bool {
         matches!(self.emitters.get(emitter.0 as usize), Some(Emitter::Point(_) | Emitter::Spot(_) | Emitter::Parallel(_)))
