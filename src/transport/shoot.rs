@@ -151,7 +151,8 @@ fn splat<R: Record, O: Observe>(
         last_delta: walk.first_delta,
         light_delta,
     };
-    finish(cx, path, c, value, weight, random, tally);
+    let lens = vertex.surface.p + c.w / c.inv_d2.sqrt();
+    finish(cx, path, c, value, (weight, lens), random, tally);
 }
 
 /// The lens sees a light point: paths of length 1 where hits are off.
@@ -186,7 +187,7 @@ fn splat_emitter<R: Record, O: Observe>(cx: Context<'_>, random: &mut Random, ta
         last_delta: false,
         light_delta: false,
     };
-    finish(cx, path, c, value, 1.0, random, tally);
+    finish(cx, path, c, value, (1.0, c.end), random, tally);
 }
 
 /// Hands on a finished path if it counts.
@@ -196,7 +197,7 @@ fn finish<R: Record, O: Observe>(
     path: Finished,
     c: SensorConnection,
     value: Spectrum,
-    weight: f32,
+    (weight, lens): (f32, Vec3),
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
@@ -211,7 +212,7 @@ fn finish<R: Record, O: Observe>(
             light: None,
             light_delta: path.light_delta,
             light_vertex: 0,
-            lens: c.end,
+            lens,
         });
     }
 }

@@ -10,6 +10,8 @@ use nephroid::transport::settings::{Settings, Techniques};
 
 /// A false alarm somewhere in a test has at most this probability.
 const ALPHA: f64 = 1e-4;
+/// At least this share of a scene's energy must be testable.
+const LEAST_ENERGY: f64 = 0.6;
 const EFFORT: Effort = Effort { renders: 40, passes: 3, max_length: 5 };
 
 /// A join, and the class of paths (k ≥ 2) that it can make.
@@ -46,19 +48,36 @@ fn lights_can_be_hit(xml: &str) -> bool {
         && (!xml.contains("type=\"directional\"") || xml.contains("angular_diameter"))
 }
 
-fn check(name: &str, what: &str, length: usize, v: &Agreement, failures: &mut Vec<String>, tests: f64) {
-    // A class without light has nothing to test.
-    if v.totals == (0.0, 0.0) {
-        return;
+/// Verdicts over the classes of a scene.
+#[derive(Default)]
+struct Verdicts {
+    failures: Vec<String>,
+    energy: f64,
+    tested: f64,
+}
+
+impl Verdicts {
+    /// `tests` = how many verdicts share the false alarm probability.
+    fn add(&mut self, what: &str, length: usize, v: &Agreement, tests: f64) {
+        let energy = 0.5 * (v.totals.0 + v.totals.1);
+        self.energy += energy;
+        self.tested += energy * v.energy_tested;
+        if v.p * tests < ALPHA {
+            self.failures.push(format!(
+                "{what}, length {length}: p = {:.2e}, totals {:.5} and {:.5}, {:.0} % of the energy tested",
+                v.p,
+                v.totals.0,
+                v.totals.1,
+                100.0 * v.energy_tested
+            ));
+        }
     }
-    if v.p * tests < ALPHA || v.energy_tested < 0.5 {
-        failures.push(format!(
-            "{name}: {what}, length {length}: p = {:.2e}, totals {:.5} and {:.5}, {:.0} % of the energy tested",
-            v.p,
-            v.totals.0,
-            v.totals.1,
-            100.0 * v.energy_tested
-        ));
+
+    fn judge(self, name: &str) {
+        let share = self.tested / self.energy;
+        println!("{name}: {:.1} % of the energy tested", 100.0 * share);
+        assert!(self.failures.is_empty(), "{name}:\n{}", self.failures.join("\n"));
+        assert!(share > LEAST_ENERGY, "{name}: only {:.1} % of the energy could be tested", 100.0 * share);
     }
 }
 
@@ -66,7 +85,7 @@ fn joins_agree(name: &str) {
     let dir = tempfile::tempdir().unwrap();
     let xml = scenes::named(dir.path(), name);
     let world: Scene = scene(&xml);
-    let mut failures = Vec::new();
+    let mut verdicts = Verdicts::default();
     let names: Vec<&str> = JOINS.iter().map(|j| j.0).filter(|j| *j != "hit" || lights_can_be_hit(&xml)).collect();
     let mut draw = 0;
     for (i, a) in names.iter().enumerate() {
@@ -78,18 +97,18 @@ fn joins_agree(name: &str) {
             };
             let (sa, sb) = (one(a), one(b));
             for k in 2..=EFFORT.max_length as usize {
-                check(name, &format!("{a} against {b} on {paths}"), k, &agreement(&sa[k], &sb[k]), &mut failures, 24.0);
+                verdicts.add(&format!("{a} against {b} on {paths}"), k, &agreement(&sa[k], &sb[k]), 24.0);
             }
         }
     }
-    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+    verdicts.judge(name);
 }
 
 /// All joins together agree with hits and next events on what gathering can see.
 fn combination_agrees(name: &str, heuristic: Heuristic) {
     let dir = tempfile::tempdir().unwrap();
     let world = scene(&scenes::named(dir.path(), name));
-    let mut failures = Vec::new();
+    let mut verdicts = Verdicts::default();
     let of = |t: &str, paths: &str, heuristic, add: u64| {
         let s = Settings { heuristic, ..settings(t, paths, seed() * 1000 + 500 + add) };
         series(&world, &s, EFFORT)
@@ -98,10 +117,10 @@ fn combination_agrees(name: &str, heuristic: Heuristic) {
         let (a, b) =
             (of(alone, walker, heuristic, 2 * i as u64), of("hit,nee,splat,connect", walker, heuristic, 2 * i as u64 + 1));
         for k in 2..=EFFORT.max_length as usize {
-            check(name, &format!("{alone} against all"), k, &agreement(&a[k], &b[k]), &mut failures, 8.0);
+            verdicts.add(&format!("{alone} against all"), k, &agreement(&a[k], &b[k]), 8.0);
         }
     }
-    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+    verdicts.judge(name);
 }
 
 macro_rules! scenes_agree {
@@ -147,7 +166,7 @@ fn power_heuristic_agrees() {
 fn roulette_does_not_matter() {
     let dir = tempfile::tempdir().unwrap();
     let world = scene(&scenes::named(dir.path(), "diffuse box"));
-    let mut failures = Vec::new();
+    let mut verdicts = Verdicts::default();
     for (i, techniques) in ["hit,nee", "splat"].into_iter().enumerate() {
         let of = |rr_depth, seed| {
             let s = Settings { rr_depth, ..settings(techniques, "", seed) };
@@ -156,8 +175,26 @@ fn roulette_does_not_matter() {
         let seeds = seed() * 1000 + 900 + 2 * i as u64;
         let (with, without) = (of(2, seeds), of(1000, seeds + 1));
         for k in 2..=EFFORT.max_length as usize {
-            check(techniques, "with roulette against without", k, &agreement(&with[k], &without[k]), &mut failures, 8.0);
+            verdicts.add(&format!("{techniques} with roulette against without"), k, &agreement(&with[k], &without[k]), 8.0);
         }
     }
-    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+    verdicts.judge("roulette");
+}
+
+/// For people: totals of one estimate, `NEPHROID_PROBE="scene;techniques;paths" cargo test probe -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints totals of a chosen scene, joins and class"]
+fn probe() {
+    let dir = tempfile::tempdir().unwrap();
+    let Ok(what) = std::env::var("NEPHROID_PROBE") else { return };
+    let parts: Vec<&str> = what.split(';').collect();
+    let world = scene(&scenes::named(dir.path(), parts[0]));
+    let effort = Effort { renders: 64, passes: 8, max_length: 5 };
+    for (k, s) in series(&world, &settings(parts[1], parts[2], seed()), effort).iter().enumerate().skip(2) {
+        let totals: Vec<f64> = s.draws.iter().map(|d| d.iter().sum()).collect();
+        let n = totals.len() as f64;
+        let mean = totals.iter().sum::<f64>() / n;
+        let variance = totals.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        println!("length {k}: {:.5} ± {:.5}", mean / effort.passes as f64, (variance / n).sqrt() / effort.passes as f64);
+    }
 }

@@ -128,7 +128,7 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
     let spot = r#"<emitter type="spot"><rgb name="intensity" value="9, 8, 6"/><float name="cutoff_angle" value="35"/><float name="beam_width" value="20"/>
       <transform name="to_world"><lookat origin="0.2, 0.9, 0.5" target="0, -1, -0.2" up="0, 0, 1"/></transform></emitter>"#;
     let directional = r#"<emitter type="directional"><vector name="direction" value="0.4, -1, -0.6"/><rgb name="irradiance" value="3, 2.7, 2"/></emitter>"#;
-    let sun = r#"<emitter type="directional"><vector name="direction" value="0.4, -1, -0.6"/><rgb name="irradiance" value="3, 2.7, 2"/><float name="angular_diameter" value="8"/></emitter>"#;
+    let sun = r#"<emitter type="directional"><vector name="direction" value="0.4, -1, -0.6"/><rgb name="irradiance" value="3, 2.7, 2"/><float name="angular_diameter" value="30"/></emitter>"#;
     let constant = r#"<emitter type="constant"><rgb name="radiance" value="0.5, 0.6, 0.8"/></emitter>"#;
     vec![
         scene("diffuse box", CAMERA, FILM, &[CEILING, AREA, BLOCK]),

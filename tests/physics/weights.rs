@@ -100,7 +100,8 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
     (world, plan, witness.seen)
 }
 
-fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize) -> usize {
+/// At most one weight in `rare` may differ by more than 1e-3.
+fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize, rare: usize) -> usize {
     let dir = tempfile::tempdir().unwrap();
     let mut tested = 0;
     for s in scenes::all(dir.path()) {
@@ -121,7 +122,7 @@ fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize) -> usize
             }
         }
         tested += seen.len();
-        // A grazing edge or a nearly coincident pair of vertices may lose digits in f32 positions.
+        // The reference takes directions from f32 positions, which lose digits on short or grazing edges.
         assert!(
             bad.len() * 2000 <= seen.len(),
             "{}: {} of {} weights differ, e.g.\n{}",
@@ -137,7 +138,7 @@ fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize) -> usize
 #[test]
 fn walks_use_the_defined_weights_on_100_000_paths_of_real_scenes() {
     let settings = Settings { connections: 2, max_length: 8, ..Settings::default() };
-    assert!(walks_use_the_defined_weights(&settings, 8000) >= 100_000);
+    assert!(walks_use_the_defined_weights(&settings, 8000, 2000) >= 100_000);
 }
 
 #[test]
@@ -149,6 +150,6 @@ fn walks_use_the_defined_weights_with_the_power_heuristic_and_without_some_joins
             max_length: 7,
             ..Settings::default()
         };
-        walks_use_the_defined_weights(&settings, 1000);
+        walks_use_the_defined_weights(&settings, 1000, 200);
     }
 }

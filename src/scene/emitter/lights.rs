@@ -113,15 +113,16 @@ impl Lights {
         NextEvent { point, w, distance: f32::INFINITY, radiance, g: 1.0, inv_d2: 1.0, nu, delta, emission }
     }
 
-    /// ν of a light point that a walk has hit from `x` along the unit direction `w` (from x outwards):
-    /// per m² of an area, per steradian of a sky; 0 for what cannot be hit.
+    /// ν of a light point as seen from `x` along the unit direction `w` (from x outwards): per m² of an
+    /// area, per steradian of a sky, discrete for what cannot be hit.
     #[inline]
     pub fn density_next_event(&self, geometry: &Geometry, x: Vec3, point: &EmitterPoint, w: Vec3) -> f32 {
         let Some((choice, i)) = self.chosen(point.emitter) else { return 0.0 };
         let p = match &self.emitters[i] {
             Emitter::Area(area) => geometry.density_toward(area.shape, x, point.y, point.n_g),
             Emitter::Sky(sky) => sky.density(w),
-            _ => return 0.0,
+            Emitter::Point(_) | Emitter::Spot(_) | Emitter::Parallel(_) => 1.0,
+            Emitter::Dark => return 0.0,
         };
         choice.next_event.prob(i) * p
     }
