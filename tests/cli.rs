@@ -3,9 +3,9 @@
 use assert_cmd::Command;
 use nephroid::io::exr::ImageFile;
 use nephroid::io::png::PngOptions;
-use nephroid::io::write::write_image;
+use nephroid::io::write::{read_image, write_image};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 fn nephroid() -> Command {
@@ -61,6 +61,22 @@ impl Room {
     fn scene(&self) -> PathBuf {
         self.path("scene.xml")
     }
+
+    /// A scene with one text replaced by another.
+    fn changed(&self, from: &str, to: &str) -> PathBuf {
+        assert!(SCENE.contains(from));
+        let path = self.path("changed.xml");
+        std::fs::write(&path, SCENE.replace(from, to)).expect("the scene is written");
+        path
+    }
+
+    /// Names of all files.
+    fn files(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.directory.path()).expect("the directory is there");
+        let mut names: Vec<_> = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
 }
 
 fn grey(path: &Path, value: f32, variance: Option<f32>) {
@@ -77,11 +93,23 @@ fn grey(path: &Path, value: f32, variance: Option<f32>) {
 fn usage_errors_are_two_and_help_is_zero() {
     let (code, out, err) = run(&mut nephroid());
     assert_eq!((code, out.as_str()), (2, ""));
-    assert!(err.contains("Usage:") && err.contains("compare"), "{err}");
+    assert!(err.contains("Usage:") && err.contains("render"), "{err}");
     assert_eq!(run(nephroid().arg("--version")).0, 0);
-    for wrong in
-        [vec!["paint"], vec!["--frobnicate"], vec!["compare", "a.exr"], vec!["compare", "a.exr", "b.exr", "--tolerance", "NaN"]]
-    {
+    assert_eq!(run(nephroid().args(["render", "--help"])).0, 0);
+    for wrong in [
+        vec!["paint"],
+        vec!["--frobnicate"],
+        vec!["render", "a.xml"],
+        vec!["render", "a.xml", "-o", "a.exr", "--spp", "0"],
+        vec!["render", "a.xml", "-o", "a.exr", "--spp=-3"],
+        vec!["render", "a.xml", "-o", "a.exr", "-D", "spp"],
+        vec!["render", "a.xml", "-o", "a.exr", "--size", "12"],
+        vec!["render", "a.xml", "-o", "a.exr", "--time", "soon"],
+        vec!["render", "a.xml", "-o", "a.exr", "--estimator", "magic"],
+        vec!["render", "a.xml", "-o", "a.exr", "--techniques", "hit,luck"],
+        vec!["compare", "a.exr"],
+        vec!["compare", "a.exr", "b.exr", "--tolerance", "NaN"],
+    ] {
         let (code, out, err) = run(nephroid().args(&wrong));
         assert_eq!((code, out.as_str()), (2, ""), "{wrong:?}: {err}");
         assert!(err.starts_with("error:"), "{wrong:?}: {err}");
@@ -146,4 +174,141 @@ fn compare_answers_by_exit_code() {
     assert_eq!(judged(&small, &[]), 2);
     assert_eq!(judged(&room.scene(), &[]), 2);
     assert_eq!(judged(&room.path("absent.exr"), &[]), 2);
+}
+
+#[test]
+fn outputs_are_refused_before_anything_is_rendered() {
+    let room = Room::new();
+    let render = |output: PathBuf| run(nephroid().arg("render").arg(room.scene()).arg("-o").arg(output));
+    let (code, _, err) = render(room.path("a.xyz"));
+    assert_eq!(code, 2);
+    assert!(err.contains(".exr") && err.contains(".png"), "{err}");
+    let (code, _, err) = render(room.path("nowhere/a.exr"));
+    assert_eq!(code, 4);
+    assert!(err.contains("nowhere"), "{err}");
+    std::fs::create_dir(room.path("folder.exr")).expect("a directory");
+    assert_eq!(render(room.path("folder.exr")).0, 4);
+    let code = run(nephroid()
+        .arg("render")
+        .arg(room.scene())
+        .arg("-o")
+        .arg(room.path("a.exr"))
+        .arg("--stats")
+        .arg(room.path("no/s.json")))
+    .0;
+    assert_eq!(code, 4);
+    for odd in [["--min-length", "5"], ["--paths", "E (D"], ["--crop", "20,0,10,10"], ["--exposure", "inf"]] {
+        let (code, _, err) = run(nephroid().arg("render").arg(room.scene()).args(odd).arg("-o").arg(room.path("a.exr")));
+        assert_eq!(code, 2, "{odd:?}: {err}");
+    }
+    assert_eq!(room.files(), ["folder.exr", "scene.xml"]);
+}
+
+#[test]
+fn a_film_beyond_memory_is_refused_at_once() {
+    let room = Room::new();
+    let start = Instant::now();
+    let mut command = nephroid();
+    command.arg("render").arg(room.scene()).args(["--size", "2000000x2000000", "-o"]).arg(room.path("a.exr"));
+    let (code, _, err) = run(&mut command);
+    assert_eq!(code, 2);
+    assert!(err.contains("--max-memory") && err.contains("PB"), "{err}");
+    // A tenth of a second on a free machine.
+    assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+    let mut command = nephroid();
+    command.arg("render").arg(room.scene()).args(["--max-memory", "10k", "-o"]).arg(room.path("a.exr"));
+    assert_eq!(run(&mut command).0, 2);
+    let zero = room.changed("\"$size\"", "\"0\"");
+    let (code, _, err) = run(nephroid().arg("render").arg(zero).arg("-o").arg(room.path("a.exr")));
+    assert_eq!(code, 2);
+    assert!(err.contains("changed.xml:9:"), "{err}");
+    assert_eq!(room.files(), ["changed.xml", "scene.xml"]);
+}
+
+#[test]
+fn renders_every_format_with_figures() {
+    let room = Room::new();
+    let mut command = nephroid();
+    command.arg("render").arg(room.scene()).args(["--seed", "3", "-t", "2", "-D", "size=20"]);
+    command.arg("-o").arg(room.path("a.exr")).arg("-o").arg(room.path("a.png")).arg("--stats").arg(room.path("s.json"));
+    let (code, out, err) = run(&mut command);
+    assert_eq!((code, out.as_str()), (0, ""), "{err}");
+    assert!(err.contains("estimator bidirectional") && err.contains("4 samples per pixel"), "{err}");
+    assert_eq!(room.files(), ["a.exr", "a.png", "s.json", "scene.xml"]);
+    let image = read_image(&room.path("a.exr")).expect("an image");
+    assert_eq!((image.width, image.height), (20, 18));
+    let mean = image.rgb("").expect("the beauty");
+    assert!(mean.iter().any(|c| c[0] > 0.0) && mean.iter().flatten().all(|v| v.is_finite()));
+    assert!(image.rgb("variance").is_some());
+    let attribute = |name: &str| image.attributes.get(name).map(String::as_str);
+    assert_eq!(attribute("samples"), Some("4"));
+    assert_eq!((attribute("estimator"), attribute("seed")), (Some("bidirectional"), Some("3")));
+    assert!(attribute("command").is_some_and(|c| c.contains("-D size=20")));
+    let figures = std::fs::read_to_string(room.path("s.json")).expect("figures");
+    let figures: serde_json::Value = serde_json::from_str(&figures).expect("JSON");
+    assert_eq!((figures["samples_per_pixel"].as_u64(), figures["threads"].as_u64()), (Some(4), Some(2)));
+    assert_eq!(figures["gather_walks"].as_u64(), Some(4 * 20 * 18));
+}
+
+/// The same bits for any number of threads, and inside a crop window the same as without it where
+/// nothing is shot.
+#[test]
+fn threads_leave_no_trace() {
+    let room = Room::new();
+    let image = |name: &str, args: &[&str]| {
+        let path = room.path(name);
+        let (code, _, err) = run(nephroid().arg("render").arg(room.scene()).arg("-q").args(args).arg("-o").arg(&path));
+        assert_eq!((code, err.as_str()), (0, ""));
+        read_image(&path).expect("an image").channels
+    };
+    for estimator in ["gather", "shoot", "bidirectional"] {
+        let one = image("1.exr", &["-e", estimator, "-t", "1"]);
+        for threads in ["2", "3", "7"] {
+            assert_eq!(one, image("n.exr", &["-e", estimator, "-t", threads]), "{estimator} with {threads} threads");
+        }
+    }
+}
+
+#[test]
+fn estimator_scene_follows_the_element() {
+    let room = Room::new();
+    let told = |kind: &str| {
+        let scene = room.changed("integrator type=\"path\"", &format!("integrator type=\"{kind}\""));
+        let mut command = nephroid();
+        command.arg("render").arg(scene).args(["--spp", "1", "-e", "scene", "-o"]).arg(room.path("a.exr"));
+        let (code, _, err) = run(&mut command);
+        assert_eq!(code, 0, "{err}");
+        err
+    };
+    assert!(told("path").contains("estimator gather"));
+    assert!(told("ptracer").contains("estimator shoot"));
+}
+
+/// The first interrupt finishes the pass and writes the image.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_the_image() {
+    use std::process::{Command, Stdio};
+    let room = Room::new();
+    for signal in ["-INT", "-TERM"] {
+        let output = room.path("a.exr");
+        let _ = std::fs::remove_file(&output);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_nephroid"))
+            .arg("render")
+            .arg(room.scene())
+            .args(["--time", "10m", "-o"])
+            .arg(&output)
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program runs");
+        // The first image is written within seconds: by then signals are handled.
+        let start = Instant::now();
+        while !output.exists() && start.elapsed() < Duration::from_secs(60) {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        std::fs::remove_file(&output).expect("an image was written during the render");
+        Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
+        assert_eq!(child.wait().expect("the program ends").code(), Some(130));
+        assert!(read_image(&output).is_ok_and(|i| i.width == 24));
+    }
 }

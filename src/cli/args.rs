@@ -23,6 +23,8 @@ Data goes to standard output, everything else to standard error.";
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Render a scene.
+    Render(Box<RenderArgs>),
     /// Read and build a scene, report every problem, render nothing.
     Check(SceneArgs),
     /// Say what is in a scene: shapes, triangles, bounds, emitters, memory.

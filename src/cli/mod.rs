@@ -5,7 +5,7 @@
 //!
 //! - [`args`], [`units`]: what can be written.
 //! - [`open`]: a scene file into a built scene.
-//! - [`output`], [`progress`], [`interrupt`]: what rendering needs.
+//! - [`render`], [`output`], [`progress`], [`interrupt`]: rendering.
 //! - [`info`], [`compare`]: the other subcommands.
 
 pub mod args;
@@ -15,6 +15,7 @@ pub mod interrupt;
 pub mod open;
 pub mod output;
 pub mod progress;
+pub mod render;
 pub mod units;
 
 use args::{Cli, Command};
@@ -73,6 +74,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let outcome = match &cli.command {
+        Command::Render(args) => render::run(args, &arguments),
         Command::Check(args) => open::check(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),

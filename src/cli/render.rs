@@ -1,0 +1,284 @@
+//! `render`: a scene file to images, progressively, until the budget is used up or somebody stops it.
+
+use super::args::{EstimatorName, HeuristicName, RenderArgs, TechniqueName};
+use super::open::{self, Described, Opened};
+use super::output::{self, Outputs};
+use super::progress::ProgressLine;
+use super::units::{show_count, show_duration};
+use super::{Exit, Failure, interrupt, tell};
+use crate::io::write::write_atomic;
+use crate::render::{Budget, Control, Estimator, Options, Outcome, Render};
+use crate::scene::Scene;
+use crate::transport::class::PathFilter;
+use crate::transport::mis::Heuristic;
+use crate::transport::settings::Techniques;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+/// Time between images written during a render; more where writing takes long.
+const SAVE_EVERY: Duration = Duration::from_secs(5);
+/// Samples per pixel where neither scene nor command line says.
+const DEFAULT_SPP: u64 = 64;
+
+/// Renders and writes.
+pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
+    let start = Instant::now();
+    let outputs = Outputs::check(args)?;
+    let paths = args.transport.paths.as_deref().map(PathFilter::parse).transpose();
+    let paths = paths.map_err(|e| Failure::usage(format!("--paths: {e}")))?.unwrap_or_default();
+    open::set_threads(args.scene.threads);
+    let mut described = open::describe(&args.scene)?;
+    set_film(&mut described, args)?;
+    let opened = open::build(described)?;
+    if !args.quiet {
+        tell(&opened.problems.render(&opened.description.sources));
+    }
+    let (estimator, mut options) = options(&opened, args);
+    options.settings.paths = paths;
+    let (shortest, longest) = (options.settings.min_length, options.settings.max_length);
+    if shortest > longest {
+        return Err(Failure::usage(format!("no path is at least {shortest} and at most {longest} edges long")));
+    }
+    let budget = budget(&opened.scene, args);
+    let mut job = Job { args, command, outputs, estimator, options, budget, start };
+    if !args.quiet {
+        tell(&job.announcement());
+    }
+    job.run(&opened.scene)
+}
+
+/// Size, crop window and memory of the film of the chosen sensor.
+fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(), Failure> {
+    let Some(sensor) = described.description.sensors.get_mut(described.sensor) else {
+        return Err(Failure::usage("the scene has no sensor"));
+    };
+    let film = &mut sensor.film;
+    if let Some([width, height]) = args.size {
+        // The same part of the picture at another size.
+        let scale = |v: u32, from: u32, to: u32| (u64::from(v) * u64::from(to) / u64::from(from.max(1))) as u32;
+        film.crop = film.crop.map(|[x, y, w, h]| {
+            let (left, top) = (scale(x, film.width, width), scale(y, film.height, height));
+            let (right, bottom) = (scale(x + w, film.width, width), scale(y + h, film.height, height));
+            [left, top, (right - left).max(1), (bottom - top).max(1)]
+        });
+        (film.width, film.height) = (width, height);
+    }
+    if let Some([x, y, w, h]) = args.crop {
+        let inside = |from: u32, size: u32, all: u32| from.checked_add(size).is_some_and(|end| end <= all);
+        if !inside(x, w, film.width) || !inside(y, h, film.height) {
+            let (width, height) = (film.width, film.height);
+            return Err(Failure::usage(format!("--crop {x},{y},{w},{h} reaches beyond the film of {width} × {height} pixels")));
+        }
+        film.crop = Some([x, y, w, h]);
+    }
+    let [_, _, width, height] = film.crop.unwrap_or([0, 0, film.width, film.height]);
+    let shoots = args.estimator != EstimatorName::Gather;
+    let needed = output::memory_needed(width, height, args.transport.light_paths, shoots);
+    output::check_memory(needed, args.max_memory, [width, height])
+}
+
+/// The estimator and all that it is told.
+fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
+    let estimator = match args.estimator {
+        EstimatorName::Gather => Estimator::Gather,
+        EstimatorName::Shoot => Estimator::Shoot,
+        EstimatorName::Bidirectional => Estimator::Bidirectional,
+        EstimatorName::Scene => Estimator::of_integrator(&opened.description.integrator.name),
+    };
+    let mut options = Options::for_scene(&opened.scene, estimator);
+    let (s, t) = (&mut options.settings, &args.transport);
+    if let Some(names) = &t.techniques {
+        let has = |name| names.contains(&name);
+        s.techniques = Techniques {
+            hit: has(TechniqueName::Hit),
+            next_event: has(TechniqueName::Nee),
+            splat: has(TechniqueName::Splat),
+            connect: has(TechniqueName::Connect),
+        };
+    }
+    s.heuristic = match t.heuristic {
+        HeuristicName::Balance => Heuristic::Balance,
+        HeuristicName::Power => Heuristic::Power,
+    };
+    s.min_length = t.min_length;
+    s.max_length = t.max_length.unwrap_or(s.max_length);
+    s.light_paths = t.light_paths;
+    s.connections = t.connections;
+    s.seed = args.seed.unwrap_or(opened.scene.seed);
+    (estimator, options)
+}
+
+/// Passes and time: the command line's, else the scene's passes.
+fn budget(scene: &Scene, args: &RenderArgs) -> Budget {
+    let of_scene = || scene.sample_count.map_or(DEFAULT_SPP, u64::from);
+    let passes = if args.time.is_some() { args.spp } else { Some(args.spp.unwrap_or_else(of_scene)) };
+    Budget { passes, time: args.time }
+}
+
+/// Everything that stays the same while a render runs.
+struct Job<'a> {
+    args: &'a RenderArgs,
+    command: &'a [OsString],
+    outputs: Outputs,
+    estimator: Estimator,
+    options: Options,
+    budget: Budget,
+    start: Instant,
+}
+
+impl Job<'_> {
+    /// One line that says what runs.
+    fn announcement(&self) -> String {
+        let passes = self.budget.passes.map(|n| format!("{n} samples per pixel"));
+        let time = self.budget.time.map(|t| format!("{} at most", show_duration(t)));
+        let until: Vec<String> = passes.into_iter().chain(time).collect();
+        let name = self.estimator.name();
+        format!("estimator {name} ({}), {}, seed {}\n", self.techniques(), until.join(", "), self.options.settings.seed)
+    }
+
+    fn techniques(&self) -> String {
+        let t = self.options.settings.techniques;
+        let names = [(t.hit, "hit"), (t.next_event, "nee"), (t.splat, "splat"), (t.connect, "connect")];
+        names.iter().filter(|n| n.0).map(|n| n.1).collect::<Vec<_>>().join(", ")
+    }
+
+    fn run(&mut self, scene: &Scene) -> Result<Exit, Failure> {
+        let mut render = Render::new(scene, &self.options).map_err(|e| Failure::usage(e.to_string()))?;
+        let pixels = u64::from(render.film().width()) * u64::from(render.film().height());
+        let line = ProgressLine::new(self.args.quiet, self.budget.passes, self.budget.time, pixels);
+        interrupt::install(self.args.quiet);
+        let began = Instant::now();
+        let mut save_after = SAVE_EVERY;
+        let mut warned = false;
+        loop {
+            let until = began.elapsed() + save_after;
+            let rest = Budget { time: self.budget.time.map(|t| t.saturating_sub(began.elapsed())), ..self.budget };
+            let outcome = render.run(&rest, |p| {
+                line.update(p.passes, began.elapsed());
+                if interrupt::asked() || began.elapsed() >= until { Control::Stop } else { Control::Continue }
+            });
+            if outcome == Outcome::Finished || interrupt::asked() {
+                break;
+            }
+            let before = Instant::now();
+            let faults = self.outputs.write(render.film(), &self.attributes(&render, scene));
+            // Writing shall not take more than a tenth of the time.
+            save_after = SAVE_EVERY.max(before.elapsed() * 10);
+            if let (Some(fault), false) = (faults.first(), warned) {
+                line.finish();
+                tell(&format!("warning: {fault}; going on, the image is tried again later\n"));
+                warned = true;
+            }
+        }
+        line.finish();
+        self.finish(&render, scene)
+    }
+
+    /// Writes what there is, and says what was done.
+    fn finish(&self, render: &Render, scene: &Scene) -> Result<Exit, Failure> {
+        let mut faults = self.outputs.write(render.film(), &self.attributes(render, scene));
+        if let Some(path) = &self.args.stats {
+            let text = serde_json::to_string_pretty(&self.figures(render, scene)).unwrap_or_default() + "\n";
+            let written = write_atomic(path, |out| {
+                out.write_all(text.as_bytes()).map_err(|e| crate::io::fault::Fault::new(crate::io::fault::reason(&e)))
+            });
+            faults.extend(written.err());
+        }
+        if !self.args.quiet {
+            tell(&self.summary(render));
+        }
+        if !faults.is_empty() {
+            let message = faults.iter().map(|f| format!("error: {f}\n")).collect();
+            return Err(Failure { exit: Exit::Output, message });
+        }
+        Ok(if interrupt::asked() { Exit::Interrupted } else { Exit::Done })
+    }
+
+    fn summary(&self, render: &Render) -> String {
+        let s = render.statistics();
+        let pixels = f64::from(render.film().width()) * f64::from(render.film().height());
+        let rate = s.passes as f64 * pixels / s.time.as_secs_f64().max(1e-9);
+        let mut text = String::new();
+        for (n, what) in [(s.dropped, "not finite and were dropped"), (s.cut, "beyond the film's range and were cut")] {
+            if n > 0 {
+                text += &format!("warning: {n} contributions were {what}\n");
+            }
+        }
+        text + &format!(
+            "{} samples per pixel in {}, {}samples/s, written to {}\n",
+            s.passes,
+            show_duration(self.start.elapsed()),
+            show_count(rate),
+            self.outputs.names()
+        )
+    }
+
+    /// What the image file says about itself.
+    fn attributes(&self, render: &Render, scene: &Scene) -> BTreeMap<String, String> {
+        let s = render.statistics();
+        let set = &self.options.settings;
+        let entries = [
+            ("software", format!("nephroid {}", env!("CARGO_PKG_VERSION"))),
+            ("sceneHash", scene.hash_hex()),
+            ("estimator", self.estimator.name().to_owned()),
+            ("techniques", self.techniques()),
+            ("seed", set.seed.to_string()),
+            ("samples", s.passes.to_string()),
+            ("renderTime", format!("{:.3}", s.time.as_secs_f64())),
+            ("command", self.command_line()),
+        ];
+        entries.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
+    }
+
+    /// The command as it could be typed again.
+    fn command_line(&self) -> String {
+        let quoted = self.command.iter().map(|a| {
+            let a = a.to_string_lossy();
+            let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
+            if !a.is_empty() && a.chars().all(plain) { a.into_owned() } else { format!("'{}'", a.replace('\'', r"'\''")) }
+        });
+        quoted.collect::<Vec<_>>().join(" ")
+    }
+
+    fn figures(&self, render: &Render, scene: &Scene) -> serde_json::Value {
+        let s = render.statistics();
+        let film = render.film();
+        let set = &self.options.settings;
+        let seconds = s.time.as_secs_f64();
+        let samples = s.passes as f64 * f64::from(film.width()) * f64::from(film.height());
+        serde_json::json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "command": self.command_line(),
+            "scene": self.args.scene.scene.to_string_lossy(),
+            "scene_hash": scene.hash_hex(),
+            "estimator": self.estimator.name(),
+            "techniques": self.techniques(),
+            "paths": set.paths.text(),
+            "seed": set.seed,
+            "width": film.width(),
+            "height": film.height(),
+            "threads": rayon::current_num_threads(),
+            "samples_per_pixel": s.passes,
+            "light_paths_per_pass": render.plan().light_paths,
+            "render_seconds": seconds,
+            "shoot_seconds": s.shoot_time.as_secs_f64(),
+            "total_seconds": self.start.elapsed().as_secs_f64(),
+            "samples_per_second": samples / seconds.max(1e-9),
+            "rays": {
+                "gather": s.rays.gather,
+                "shoot": s.rays.shoot,
+                "shadow": s.rays.shadow,
+                "per_second": s.rays.total() as f64 / seconds.max(1e-9),
+            },
+            "gather_walks": s.rays.gather_walks,
+            "shoot_walks": s.rays.shoot_walks,
+            "light_vertices_of_last_pass": s.light_vertices,
+            "contributions_dropped": s.dropped,
+            "contributions_cut": s.cut,
+            "film_bytes": crate::film::Film::bytes(film.width(), film.height()),
+            "interrupted": interrupt::asked(),
+        })
+    }
+}
