@@ -138,41 +138,33 @@ fn nephroid_distance(p: DVec2, radius: f64) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Opacity of a carved screen: 1 = wood, 0 = open. Eight-pointed stars and crosses, 4 × 4.
+/// Opacity of a carved screen: 1 = wood, 0 = open. Eight-pointed stars that touch with their tips
+/// leave crosses between them; the wood follows their outline. 4 × 4 stars.
 pub fn lattice(size: u32) -> Vec<u8> {
+    // Half the side of the two squares that make a star, so that its tips reach the cell's edge.
+    const HALF: f64 = 0.5 * std::f64::consts::FRAC_1_SQRT_2;
     grey_png(size, size, 15.0, |x, y| {
         let cell = dvec2((4.0 * x).fract() - 0.5, (4.0 * y).fract() - 0.5);
-        let edge = |p: DVec2, half: f64| p.x.abs().max(p.y.abs()) - half;
-        let turned = |p: DVec2| dvec2(p.x + p.y, p.x - p.y) * std::f64::consts::FRAC_1_SQRT_2;
-        // A star is the union of a square and the same square turned by 45°.
-        let star = |p: DVec2, half: f64| edge(p, half).min(edge(turned(p), half));
-        let corner = dvec2(cell.x.abs() - 0.5, cell.y.abs() - 0.5);
-        let middle = star(cell, 0.275).abs() - 0.028;
-        let rosette = star(cell, 0.135);
-        let bars = cell.x.abs().min(cell.y.abs()) - 0.020;
-        let bars = bars.max(0.275 - cell.length());
-        let between = star(corner, 0.150).abs() - 0.024;
-        let spokes = turned(cell).x.abs().min(turned(cell).y.abs()) - 0.018;
-        let spokes = spokes.max(cell.length() - 0.29).max(0.12 - cell.length());
-        let wood = middle.min(bars).min(between).min(spokes).min(rosette.abs() - 0.02);
-        0.5 - wood * f64::from(size) / 4.0
+        let turned = dvec2(cell.x + cell.y, cell.x - cell.y) * std::f64::consts::FRAC_1_SQRT_2;
+        let square = |p: DVec2| p.x.abs().max(p.y.abs()) - HALF;
+        let outline = square(cell).min(square(turned)).abs() - 0.038;
+        let frame = 0.5 - (x - 0.5).abs().max((y - 0.5).abs()) - 0.012;
+        0.5 - outline.min(4.0 * frame) * f64::from(size) / 4.0
     })
 }
 
-/// Glazed floor tiles: a motif of quarter circles on a 2 × 2 pattern.
+/// Floor tiles, 4 × 4: pale octagons, dark squares set cornerwise, grout between.
 pub fn tiles(size: u32) -> Vec<u8> {
     grey_png(size, size, 15.0, |x, y| {
-        let (u, v) = ((2.0 * x).fract() - 0.5, (2.0 * y).fract() - 0.5);
-        let corner = dvec2(u.abs() - 0.5, v.abs() - 0.5).length();
-        let grout = u.abs().max(v.abs()) > 0.488;
-        let ring = ((corner - 0.38).abs() < 0.055) || corner < 0.16;
-        let diamond = u.abs() + v.abs() < 0.17;
+        let cell = dvec2((4.0 * x).fract() - 0.5, (4.0 * y).fract() - 0.5).abs();
+        let dot = 1.0 - cell.x - cell.y;
+        let grout = (cell.max_element() > 0.487 && dot > 0.2) || (dot - 0.2).abs() < 0.014;
         if grout {
-            0.55
-        } else if ring || diamond {
+            0.35
+        } else if dot < 0.2 {
             0.0
         } else {
-            1.0
+            0.86 + 0.14 * hash((4.0 * x) as i64, (4.0 * y) as i64, 8)
         }
     })
 }
