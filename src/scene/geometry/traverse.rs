@@ -51,7 +51,8 @@ impl<L: Lanes> WideRay<L> {
             return None;
         }
         let flat = FLAT * d_abs.max_element().max(1e-20);
-        let inverse = d.to_array().map(|x| 1.0 / if x.abs() < flat { flat.copysign(x) } else { x });
+        let (o, d) = (o.to_array(), d.to_array());
+        let inverse = d.map(|x| 1.0 / if x.abs() < flat { flat.copysign(x) } else { x });
         let row = |axis: usize| 2 * axis + usize::from(inverse[axis].is_sign_negative());
         let slack = 4.0 * f32::EPSILON * o_abs.max_element();
         let plane = |axis: usize, sign: f32| L::splat(inverse[axis] * o[axis] + sign * inverse[axis].abs() * slack);
@@ -62,7 +63,7 @@ impl<L: Lanes> WideRay<L> {
         } else {
             2
         };
-        let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
+        let [x, y] = [[1, 2], [2, 0], [0, 1]][z];
         let over_z = 1.0 / d[z];
         Some(Self {
             reciprocal: inverse.map(L::splat),
@@ -131,42 +132,50 @@ fn meet_block<L: Lanes>(block: &Block, ray: &WideRay<L>, t_far: L, hit: &mut Hit
     }
 }
 
-/// The nearest hit with an analytic shape or an instance, if within (0, `hit.t`), replaces `hit`.
-#[inline(always)]
-fn meet_other<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, code: u32, ray: &Ray, hit: &mut Hit) {
+/// The nearest hit with an analytic shape or an instance within (0, `t_max`), or a miss.
+#[inline(never)]
+fn meet_other<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, code: u32, ray: &Ray, t_max: f32) -> Hit {
     let index = (code & !(LEAF | KIND)) as usize;
     match code & KIND {
         ANALYTIC => {
             if let Some((shape, prim)) = tree.analytic.get(index)
-                && let Some(t) = shape.intersect(ray.o, ray.d, hit.t)
+                && let Some(t) = shape.intersect(ray.o, ray.d, t_max)
             {
-                *hit = Hit { t, u: 0.0, v: 0.0, prim: *prim, instance: NONE };
+                return Hit { t, prim: *prim, ..MISS };
             }
         }
         INSTANCE if TOP => {
             if let Some(instance) = tree.instances.get(index) {
-                let inner = L::enter::<ANY>(tree, instance.root, &instance.ray_to_group(ray, hit.t));
-                if inner.prim != NONE {
-                    *hit = Hit { instance: index as u32, ..inner };
-                }
+                let inner = L::enter::<ANY>(tree, instance.root, &instance.ray_to_group(ray, t_max));
+                return Hit { instance: index as u32, ..inner };
             }
         }
         _ => {}
     }
+    MISS
 }
 
+/// Room for the children that wait.
+type Room = MaybeUninit<[u64; STACK]>;
+
 /// Children waiting to be visited: entry distance (as bits, which sort like the distance) above code.
-struct Stack {
-    items: [MaybeUninit<u64>; STACK],
+struct Stack<'a> {
+    room: &'a mut Room,
     len: usize,
 }
 
-impl Stack {
+impl Stack<'_> {
+    /// Place `i`, below [`STACK`].
+    #[inline(always)]
+    fn at(&mut self, i: usize) -> *mut u64 {
+        self.room.as_mut_ptr().cast::<u64>().wrapping_add(i)
+    }
+
     #[inline(always)]
     fn push(&mut self, item: u64) {
         debug_assert!(self.len < STACK);
         // SAFETY: the builder measured that no tree needs more than STACK places.
-        unsafe { self.items.get_unchecked_mut(self.len).write(item) };
+        unsafe { self.at(self.len).write(item) };
         self.len += 1;
     }
 
@@ -174,21 +183,21 @@ impl Stack {
     fn pop(&mut self) -> Option<u64> {
         self.len = self.len.checked_sub(1)?;
         // SAFETY: below `len`, hence written.
-        Some(unsafe { self.items.get_unchecked(self.len).assume_init() })
+        Some(unsafe { self.at(self.len).read() })
     }
 
     /// Pushes so that the items from `base` on stay sorted, nearest last.
     #[inline(always)]
     fn insert(&mut self, base: usize, item: u64) {
         self.push(item);
-        let mut at = self.len - 1;
-        // SAFETY: base ≤ at < len.
+        let mut i = self.len - 1;
+        // SAFETY: base ≤ i < len.
         unsafe {
-            while at > base && self.items.get_unchecked(at - 1).assume_init() < item {
-                *self.items.get_unchecked_mut(at) = *self.items.get_unchecked(at - 1);
-                at -= 1;
+            while i > base && self.at(i - 1).read() < item {
+                self.at(i).write(self.at(i - 1).read());
+                i -= 1;
             }
-            self.items.get_unchecked_mut(at).write(item);
+            self.at(i).write(item);
         }
     }
 }
@@ -234,7 +243,8 @@ pub(super) fn traverse<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, 
     let Some(wide) = WideRay::<L>::new(ray.o, ray.d) else { return MISS };
     let mut hit = Hit { t: ray.t_max, ..MISS };
     let mut t_far = L::splat(ray.t_max);
-    let mut stack = Stack { items: [MaybeUninit::uninit(); STACK], len: 0 };
+    let mut room = Room::uninit();
+    let mut stack = Stack { room: &mut room, len: 0 };
     let mut code = root;
     loop {
         'down: {
@@ -257,7 +267,10 @@ pub(super) fn traverse<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, 
                 let block = unsafe { tree.blocks.get_unchecked((code & !LEAF) as usize) };
                 meet_block(block, &wide, t_far, &mut hit);
             } else {
-                meet_other::<L, ANY, TOP>(tree, code, ray, &mut hit);
+                let other = meet_other::<L, ANY, TOP>(tree, code, ray, hit.t);
+                if other.prim != NONE {
+                    hit = other;
+                }
             }
             if ANY && hit.prim != NONE {
                 return hit;
