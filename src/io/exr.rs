@@ -4,13 +4,16 @@
 //! layer name: `beauty.R`), whatever the sample type. [`ImageFile`] keeps every channel by its full
 //! name and every text or number attribute, so that what was written can be read back whole.
 
-use super::fault::{Decoded, Fault, io_fault};
-use super::image::{check_size, one_line};
+mod blocks;
+
+use super::fault::{Decoded, Fault, escape, guarded, io_fault};
+use super::image::one_line;
 use crate::describe::Image;
 use ::exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder,
-    MetaData, ReadChannels, ReadLayers, SmallVec, Text, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, ChannelDescription, Compression, Encoding, FlatSamples, Layer, LayerAttributes,
+    LineOrder, SmallVec, Text, WritableImage,
 };
+use blocks::Blocks;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write};
 
@@ -61,71 +64,36 @@ pub fn is_exr(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
 }
 
-type Flat = ::exr::prelude::FlatImage;
-
-/// Reads everything after looking at the sizes in the header.
-fn read(bytes: &[u8]) -> Result<Flat, Fault> {
-    let bad = |e: ::exr::error::Error| Fault::new(format!("is not a sound EXR file: {}", one_line(&e.to_string())));
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(bad)?;
-    let mut samples = 0_u64;
-    for header in &meta.headers {
-        if header.deep {
-            return Err(Fault::new("holds deep data, which is not supported"));
-        }
-        let size = header.layer_size;
-        check_size(size.x() as u64, size.y() as u64)?;
-        if header.channels.list.iter().any(|c| c.sampling != ::exr::math::Vec2(1, 1)) {
-            return Err(Fault::new("has subsampled channels, which are not supported").hint("save it as RGB"));
-        }
-        samples += (size.x() * size.y() * header.channels.list.len()) as u64;
-        // Every chunk takes at least its entry in the offset table and its own header.
-        if header.chunk_count as u64 * 16 > bytes.len() as u64 {
-            let what = format!("claims {} chunks, but has only {} bytes", header.chunk_count, bytes.len());
-            return Err(Fault::new(what).hint("the file is cut off"));
-        }
-    }
-    check_samples(samples)?;
-    let reader = ::exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
-    reader.from_buffered(Cursor::new(bytes)).map_err(bad)
-}
-
-fn check_samples(samples: u64) -> Result<(), Fault> {
-    let most = super::image::MAX_PIXELS * 4;
-    if samples > most {
-        return Err(Fault::new(format!("has {samples} samples in all its channels, too many to read"))
-            .hint(format!("the limit is {most}")));
-    }
-    Ok(())
-}
-
 /// Reads a texture.
 pub(super) fn parse_image(bytes: &[u8]) -> Result<Decoded<Image>, Fault> {
-    let file = read(bytes)?;
-    for layer in &file.layer_data {
-        let list = &layer.channel_data.list;
-        let Some(chosen) = colour_channels(list) else { continue };
-        let (width, height) = (layer.size.x(), layer.size.y());
-        let mut data = vec![0.0; width * height * chosen.len()];
-        for (k, &c) in chosen.iter().enumerate() {
-            let out = data.iter_mut().skip(k).step_by(chosen.len());
-            out.zip(list[c].sample_data.values_as_f32()).for_each(|(o, v)| *o = v);
-        }
-        let value = Image { width: width as u32, height: height as u32, channels: chosen.len() as u32, data };
-        return Ok(Decoded { value, warnings: Vec::new() });
+    let blocks = Blocks::open(bytes)?;
+    let headers = blocks.headers();
+    let found = headers.iter().enumerate().find_map(|(part, h)| Some((part, colour_channels(&h.channels.list)?)));
+    let Some((part, chosen)) = found else {
+        let channels = headers.iter().flat_map(|h| &h.channels.list);
+        let names: Vec<String> = channels.take(12).map(|c| escape(c.name.as_slice())).collect();
+        return Err(Fault::new("has no channels R, G, B or Y").hint(format!("its channels are {}", names.join(", "))));
+    };
+    let (size, channels) = (headers[part].layer_size, chosen.len());
+    let planes = blocks.planes(&chosen.iter().map(|&c| (part, c)).collect::<Vec<_>>())?;
+    let mut data = vec![0.0; size.area() * channels];
+    for (k, plane) in planes.iter().enumerate() {
+        data.iter_mut().skip(k).step_by(channels).zip(plane).for_each(|(o, v)| *o = *v);
     }
-    let names: Vec<String> =
-        file.layer_data.iter().flat_map(|l| &l.channel_data.list).take(12).map(|c| c.name.to_string()).collect();
-    Err(Fault::new("has no channels R, G, B or Y").hint(format!("its channels are {}", names.join(", "))))
+    let value = Image { width: size.x() as u32, height: size.y() as u32, channels: channels as u32, data };
+    Ok(Decoded { value, warnings: Vec::new() })
 }
 
 /// The indices of R, G, B or of Y, without a layer name if possible, else of the first layer that
 /// has them, else of the only channel.
-fn colour_channels(list: &[AnyChannel<FlatSamples>]) -> Option<Vec<usize>> {
+fn colour_channels(list: &[ChannelDescription]) -> Option<Vec<usize>> {
     let names: Vec<String> = list.iter().map(|c| c.name.to_string()).collect();
     let find = |name: &str| names.iter().position(|n| n.eq_ignore_ascii_case(name));
     let mut prefixes = vec![""];
     prefixes.extend(names.iter().filter_map(|n| n.rfind('.').map(|dot| &n[..=dot])));
-    for p in prefixes {
+    prefixes.dedup();
+    // The bound is for files that are all names.
+    for p in prefixes.into_iter().take(256) {
         let rgb: Option<Vec<usize>> = ["R", "G", "B"].iter().map(|c| find(&format!("{p}{c}"))).collect();
         if let Some(found) = rgb.or_else(|| find(&format!("{p}Y")).map(|y| vec![y])) {
             return Some(found);
@@ -137,28 +105,34 @@ fn colour_channels(list: &[AnyChannel<FlatSamples>]) -> Option<Vec<usize>> {
 /// Reads every channel and attribute. Channels of a named part are prefixed with its name unless
 /// they carry it already; all parts must have the same size.
 pub fn parse_file(bytes: &[u8]) -> Result<ImageFile, Fault> {
-    let file = read(bytes)?;
-    let first = file.layer_data.first().ok_or_else(|| Fault::new("has no layers"))?;
-    let mut out = ImageFile::new(first.size.x() as u32, first.size.y() as u32);
-    let parts = file.layer_data.len();
-    out.attributes.extend(file.attributes.other.iter().filter_map(attribute));
-    for layer in &file.layer_data {
-        if layer.size != first.size {
+    guarded(|| all_channels(bytes))
+}
+
+fn all_channels(bytes: &[u8]) -> Result<ImageFile, Fault> {
+    let blocks = Blocks::open(bytes)?;
+    let headers = blocks.headers();
+    let size = headers.first().ok_or_else(|| Fault::new("has no parts"))?.layer_size;
+    let mut out = ImageFile::new(size.x() as u32, size.y() as u32);
+    let (mut wanted, mut names) = (Vec::new(), Vec::new());
+    for (part, header) in headers.iter().enumerate() {
+        if header.layer_size != size {
             return Err(Fault::new("has parts of different sizes, which is not supported"));
         }
-        let part = layer.attributes.layer_name.as_ref().map(ToString::to_string).filter(|_| parts > 1);
-        for channel in &layer.channel_data.list {
+        let own = &header.own_attributes;
+        let prefix = own.layer_name.as_ref().map(ToString::to_string).filter(|_| headers.len() > 1);
+        for (k, channel) in header.channels.list.iter().enumerate() {
             let name = channel.name.to_string();
-            let full = match &part {
-                Some(part) if !name.starts_with(&format!("{part}.")) => channel_name(part, &name),
+            wanted.push((part, k));
+            names.push(match &prefix {
+                Some(prefix) if !name.starts_with(&format!("{prefix}.")) => channel_name(prefix, &name),
                 _ => name,
-            };
-            out.channels.insert(full, channel.sample_data.values_as_f32().collect());
+            });
         }
-        out.attributes.extend(layer.attributes.other.iter().filter_map(attribute));
-        let standard = [("comments", &layer.attributes.comments), ("software", &layer.attributes.software_name)];
+        out.attributes.extend(header.shared_attributes.other.iter().chain(&own.other).filter_map(attribute));
+        let standard = [("comments", &own.comments), ("software", &own.software_name)];
         out.attributes.extend(standard.iter().filter_map(|(k, v)| Some(((*k).to_owned(), utf8(v.as_ref()?)))));
     }
+    out.channels = names.into_iter().zip(blocks.planes(&wanted)?).collect();
     Ok(out)
 }
 
@@ -204,7 +178,11 @@ pub(super) fn write(mut out: impl Write, file: &ImageFile) -> Result<(), Fault> 
             _ => drop(attributes.other.insert(text(name), AttributeValue::Text(text(value)))),
         }
     }
-    let encoding = Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: ::exr::prelude::Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
     let image = ::exr::prelude::Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(list)));
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|e| Fault::new(one_line(&e.to_string())))?;

@@ -59,6 +59,13 @@ pub struct Decoded<T> {
     pub warnings: Vec<String>,
 }
 
+/// Runs a decoder of another crate. They return errors for all damage we know of; should one panic
+/// on some file all the same, that is the file's fault and not the end of the process.
+pub(super) fn guarded<T>(decode: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode))
+        .unwrap_or_else(|_| Err(Fault::new("is damaged in a way that its decoder cannot handle")))
+}
+
 /// At most 40 bytes of a foreign file as printable text; longer ones end in `…`.
 pub fn escape(bytes: &[u8]) -> String {
     let cut = &bytes[..bytes.len().min(40)];

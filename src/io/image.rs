@@ -9,9 +9,10 @@
 //! compression, against the length of the file before anything is allocated.
 
 use super::exr;
-use super::fault::{Decoded, Fault, reason};
+use super::fault::{Decoded, Fault, guarded, reason};
 use crate::describe::Image;
-use ::image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits};
+use ::image::codecs::hdr::HdrDecoder;
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -26,10 +27,10 @@ pub fn parse(bytes: &[u8], path: &Path, raw: bool) -> Result<Decoded<Image>, Fau
         return Err(Fault::new("is empty"));
     }
     if exr::is_exr(bytes) {
-        return exr::parse_image(bytes);
+        return guarded(|| exr::parse_image(bytes));
     }
     let format = format_of(bytes, path)?;
-    let value = to_linear(decode(bytes, format)?, raw);
+    let value = to_linear(guarded(|| decode(bytes, format))?, raw);
     Ok(Decoded { value, warnings: Vec::new() })
 }
 
@@ -50,6 +51,13 @@ fn format_of(bytes: &[u8], path: &Path) -> Result<ImageFormat, Fault> {
 }
 
 fn decode(bytes: &[u8], format: ImageFormat) -> Result<DynamicImage, Fault> {
+    if format == ImageFormat::Hdr {
+        // The lenient form also takes the signature `#?RGBE`, which Mitsuba writes.
+        let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(image_fault)?;
+        let (width, height) = decoder.dimensions();
+        check_size(u64::from(width), u64::from(height))?;
+        return DynamicImage::from_decoder(decoder).map_err(image_fault);
+    }
     let (width, height) = ImageReader::with_format(Cursor::new(bytes), format).into_dimensions().map_err(image_fault)?;
     check_size(u64::from(width), u64::from(height))?;
     // Deflate cannot expand more than 1032 times, and a pixel has at least one bit.
@@ -120,7 +128,11 @@ fn to_linear(picture: DynamicImage, raw: bool) -> Image {
 
 /// The first `keep` of every `stride` samples.
 fn pick<T: Copy>(samples: &[T], stride: usize, keep: usize, f: impl Fn(T) -> f32) -> Vec<f32> {
-    samples.chunks_exact(stride).flat_map(|pixel| &pixel[..keep]).map(|&x| f(x)).collect()
+    let mut out = Vec::with_capacity(samples.len() / stride * keep);
+    for pixel in samples.chunks_exact(stride) {
+        out.extend(pixel[..keep].iter().map(|&x| f(x)));
+    }
+    out
 }
 
 fn decoded(c: f32, raw: bool) -> f32 {

@@ -72,8 +72,10 @@ fn other_formats_hold_the_same_picture() {
 fn radiance_is_linear() {
     let picture = ImageBuffer::<Rgb<f32>, _>::from_raw(2, 1, vec![0.1_f32, 1.0, 2.0, 2.5, 0.0, 1.25]).expect("right size");
     let file = bytes(picture, ImageFormat::Hdr);
-    for raw in [false, true] {
-        let image = read(&file, raw);
+    // The other signature.
+    let renamed = [b"#?RGBE\n", file.strip_prefix(b"#?RADIANCE\n").expect("the signature")].concat();
+    for (file, raw) in [(&file, false), (&file, true), (&renamed, false)] {
+        let image = read(file, raw);
         assert_eq!((image.width, image.height, image.channels), (2, 1, 3));
         for (x, e) in image.data.iter().zip([0.1_f32, 1.0, 2.0, 2.5, 0.0, 1.25]) {
             approx::assert_abs_diff_eq!(*x, e, epsilon = 0.01);

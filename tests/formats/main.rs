@@ -9,6 +9,7 @@ mod mitsuba;
 mod mitsuba_errors;
 mod mitsuba_manual;
 mod obj;
+mod peers;
 mod ply;
 mod serialized;
 mod write;
