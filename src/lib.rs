@@ -30,6 +30,7 @@ pub mod spectrum;
 pub mod texture;
 pub mod transport;
 
+pub use glam;
 use std::path::Path;
 
 /// A scene ready to render, and what may not be as meant.
