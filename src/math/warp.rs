@@ -16,10 +16,21 @@ pub fn disk_concentric(u: Vec2) -> Vec2 {
     if o == Vec2::ZERO {
         return Vec2::ZERO;
     }
-    let (r, phi) =
-        if o.x.abs() > o.y.abs() { (o.x, (PI / 4.0) * (o.y / o.x)) } else { (o.y, PI / 2.0 - (PI / 4.0) * (o.x / o.y)) };
-    let (s, c) = phi.sin_cos();
-    Vec2::new(r * c, r * s)
+    // Beyond the diagonal the angle is π/2 − φ: sine and cosine change places.
+    let swapped = o.x.abs() <= o.y.abs();
+    let (r, phi) = if swapped { (o.y, (PI / 4.0) * (o.x / o.y)) } else { (o.x, (PI / 4.0) * (o.y / o.x)) };
+    let (s, c) = sin_cos_small(phi);
+    if swapped { Vec2::new(r * s, r * c) } else { Vec2::new(r * c, r * s) }
+}
+
+/// Sine and cosine of |x| ≤ π/4 by their series, to 1 ulp or so: several times faster than the
+/// general functions, and the same on every machine.
+#[inline]
+fn sin_cos_small(x: f32) -> (f32, f32) {
+    let x2 = x * x;
+    let sin = x + x * x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0))));
+    let cos = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0))));
+    (sin, cos)
 }
 
 /// Cosine-weighted hemisphere around +z: `p_w = cosθ / π`.
