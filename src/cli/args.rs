@@ -85,9 +85,9 @@ pub enum TechniqueName {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum HeuristicName {
     /// Weights in proportion to densities.
-    #[default]
     Balance,
     /// Weights in proportion to squared densities.
+    #[default]
     Power,
 }
 

@@ -167,7 +167,9 @@ fn hit<R: Record, O: Observe>(
         } else {
             0.0
         };
-        mis::hit(plan.settings.heuristic, arrival.p_a, nu, e, walk.k)
+        // Without splats among them, hits and next events share the paths of length 2.
+        let k = if length == 2 && !plan.splat_direct { 0.0 } else { walk.k };
+        mis::hit(plan.settings.heuristic, arrival.p_a, nu, e, k)
     };
     let path = Finished {
         from_eye: walk.class,
@@ -215,7 +217,8 @@ fn next_event<R: Record, O: Observe>(
     let h = plan.settings.heuristic;
     let g = if plan.settings.techniques.hit && !ne.delta { k.p_w * ne.g } else { 0.0 };
     let e = if plan.two_sided { ne.emission.p_k * ne.emission.p_next * k.cos_g * ne.inv_d2 } else { 0.0 };
-    let weight = mis::next_event(h, ne.nu, g, e, partial.at(h, k.p_w_rev));
+    let sum = if length == 2 && !plan.splat_direct { 0.0 } else { partial.at(h, k.p_w_rev) };
+    let weight = mis::next_event(h, ne.nu, g, e, sum);
     let value = walk.throughput * k.value * ne.radiance * (ne.g / ne.nu * weight);
     if value.is_black() {
         return;

@@ -41,9 +41,9 @@ impl Real for f64 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Heuristic {
     /// w ∝ p.
-    #[default]
     Balance,
     /// w ∝ p².
+    #[default]
     Power,
 }
 

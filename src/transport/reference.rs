@@ -165,7 +165,7 @@ pub fn weights(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
             }
         }
     }
-    if plan.n > 0.0 && !d.delta[1] {
+    if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), f64::from(plan.n) * shot(1)));
     }
     let total: f64 = joins.iter().map(|j| h.raise(j.1)).sum();
@@ -180,7 +180,8 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let h = plan.settings.heuristic;
-    let (n, c) = (f64::from(plan.n), f64::from(plan.c));
+    let n = if k > 2 || plan.splat_direct { f64::from(plan.n) } else { 0.0 };
+    let c = f64::from(plan.c);
     let nu = if t.next_event && !d.delta[k - 1] { d.nu } else { 0.0 };
     let hit = if t.hit { d.g[k] } else { 0.0 };
     // Gathering sums K_i from the eye, shooting sums H_i from the light; the reverse density of a
@@ -232,7 +233,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
             }
         }
     }
-    if plan.n > 0.0 && !d.delta[1] {
+    if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), mis::splat(h, n, d.g[1], h_at(1))));
     }
     joins

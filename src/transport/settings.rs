@@ -83,7 +83,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             techniques: Techniques::BIDIRECTIONAL,
-            heuristic: Heuristic::Balance,
+            heuristic: Heuristic::default(),
             min_length: 1,
             max_length: u32::MAX,
             rr_depth: 5,
@@ -112,6 +112,9 @@ pub struct Plan {
     pub two_sided: bool,
     /// Shooting makes paths of length 1 (hits are off).
     pub splat_emitters: bool,
+    /// Splats take part in paths of length 2. Not where next events do: those see all such paths, often
+    /// without any noise (delta lights), which no weight that ignores variance would honour.
+    pub splat_direct: bool,
     /// Factor on splats from normalisation, 1/N.
     pub inv_light_paths: f32,
 }
@@ -141,6 +144,7 @@ impl Plan {
             c,
             two_sided: (n > 0.0 || c > 0.0) && t.gathers(),
             splat_emitters: t.splat && !t.hit,
+            splat_direct: t.splat && !t.next_event,
             inv_light_paths: if light_paths > 0 { 1.0 / normaliser as f32 } else { 0.0 },
             settings,
         }

@@ -74,7 +74,7 @@ pub fn shoot<R: Record, O: Observe>(
         };
         let partial = walk.partial(h, arrival, count);
         if !vertex.closure.is_delta() {
-            if plan.settings.techniques.splat {
+            if plan.settings.techniques.splat && (length > 1 || plan.splat_direct) {
                 splat(cx, &walk, &vertex, partial, start.delta, random, tally);
             }
             if let Some(cache) = cache.as_mut()
