@@ -82,7 +82,7 @@ const CHECKS: [Check; 6] = [
 fn p_of(check: &Check) -> f64 {
     let dir = tempfile::tempdir().unwrap();
     let world = scene(&scenes::named(dir.path(), check.scene));
-    let effort = Effort { renders: 40, passes: 3, max_length: 5 };
+    let effort = Effort { renders: 64, passes: 10, max_length: 5 };
     let run = |(techniques, rr_depth): (&str, u32), seed: u64| {
         let settings = Settings {
             techniques: Techniques::parse(techniques).unwrap(),

@@ -70,10 +70,10 @@ fn xml(sensor: &str, film: &str, parts: &[&str]) -> String {
     format!(r#"<scene version="3.0.0">{}{WALLS}{}</scene>"#, sensor.replace("FILM", film), parts.concat())
 }
 
-/// A sphere of 10 × 6 facets with smooth normals, written where the test can name it.
+/// A sphere of 7 × 4 facets with smooth normals, written where the test can name it.
 fn coarse_sphere(dir: &Path) -> PathBuf {
     use std::fmt::Write;
-    let (columns, rows) = (10, 6);
+    let (columns, rows) = (7, 4);
     let mut obj = String::new();
     for j in 0..=rows {
         for i in 0..columns {

@@ -136,7 +136,7 @@ fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize, rare: us
 
 #[test]
 fn walks_use_the_defined_weights_on_100_000_paths_of_real_scenes() {
-    let settings = Settings { connections: 2, max_length: 8, ..Settings::default() };
+    let settings = Settings { heuristic: Heuristic::Balance, connections: 2, max_length: 8, ..Settings::default() };
     assert!(walks_use_the_defined_weights(&settings, 8000, 2000) >= 100_000);
 }
 
