@@ -239,7 +239,7 @@ fn renders_every_format_with_figures() {
     assert_eq!((image.width, image.height), (20, 18));
     let mean = image.rgb("").expect("the beauty");
     assert!(mean.iter().any(|c| c[0] > 0.0) && mean.iter().flatten().all(|v| v.is_finite()));
-    assert!(image.rgb("variance").is_some());
+    assert!(image.rgb("variance").is_some() && image.rgb("blockVariance").is_some());
     let attribute = |name: &str| image.attributes.get(name).map(String::as_str);
     assert_eq!(attribute("samples"), Some("4"));
     assert_eq!((attribute("estimator"), attribute("seed")), (Some("bidirectional"), Some("3")));

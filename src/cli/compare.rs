@@ -26,5 +26,6 @@ pub fn picture(path: &Path) -> Result<Picture, Failure> {
     let mean = file.rgb("").ok_or_else(|| Failure::usage(format!("{}: no channels R, G, B or Y", path.display())))?;
     let ImageFile { width, height, .. } = file;
     let samples = file.attributes.get("samples").and_then(|s| s.parse().ok());
-    Ok(Picture { width, height, mean, variance: file.rgb("variance"), samples })
+    let (variance, block_variance) = (file.rgb("variance"), file.rgb("blockVariance"));
+    Ok(Picture { width, height, mean, variance, block_variance, samples })
 }

@@ -11,8 +11,8 @@ use crate::io::write::{OutputFormat, check_writable, write_image};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Bytes per pixel of the buffers between film and file: mean, variance and their planes.
-const WRITE_BYTES: u64 = 48;
+/// Bytes per pixel of the buffers between film and file: mean, two variances and their planes.
+const WRITE_BYTES: u64 = 72;
 /// Bytes of a light path of a pass: its splats and kept vertices, about four of each.
 const LIGHT_PATH_BYTES: u64 = 4 * (2 * 16 + 96);
 
@@ -46,6 +46,7 @@ impl Outputs {
         file.insert_rgb("", &film.mean());
         if film.passes().count() >= 2 {
             file.insert_rgb("variance", &film.variance_of_mean());
+            file.insert_rgb("blockVariance", &film.variance_of_tile_mean());
         }
         self.paths.iter().filter_map(|path| write_image(path, &file, self.png).err()).collect()
     }

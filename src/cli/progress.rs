@@ -72,6 +72,6 @@ mod tests {
         let line = ProgressLine { bar: None, passes: Some(64), time: Some(20 * second), pixels: 1_000_000 };
         assert_eq!(line.share(16, 4 * second), 0.25);
         assert_eq!(line.share(16, 10 * second), 0.5);
-        assert_eq!(line.message(16, 8 * second, 0.25), "16/64 passes, 2.00 M samples/s, 24.0 s left");
+        assert_eq!(line.message(16, 8 * second, 0.25), "16/64 passes, 2.00 Msamples/s, 24.0 s left");
     }
 }

@@ -207,8 +207,9 @@ impl Job<'_> {
             }
         }
         text + &format!(
-            "{} samples per pixel in {}, {}samples/s, written to {}\n",
+            "{} sample{} per pixel in {}, {}samples/s, written to {}\n",
             s.passes,
+            if s.passes == 1 { "" } else { "s" },
             show_duration(self.start.elapsed()),
             show_count(rate),
             self.outputs.names()

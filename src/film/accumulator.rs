@@ -3,6 +3,10 @@
 //! A job owns a tile and, for one pass, a [`TileBuffer`] in which the gathered sample and the splats
 //! of each pixel are added up to `x_p`; [`Tile::commit`] then adds `x_p` and its square. The square
 //! is taken of an exact integer, so the second sum is as independent of order as the first.
+//!
+//! Pixels of one pass are not independent of each other: a light path splats into several, and
+//! connections share its vertices. A tile therefore also keeps `Σ_p (Σ_j x_jp)²` over its pixels, whence
+//! the variance of its mean with all that its pixels have in common.
 
 use super::exact::{self, Exact, Rounded};
 use super::layout::{Layout, Rect, TILE_PIXELS};
@@ -62,24 +66,28 @@ struct Cell {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tile {
     cells: [Cell; TILE_PIXELS],
+    /// Σ over passes of the square of the sum over pixels.
+    block_squares: [u128; 3],
     dropped: u64,
     cut: u64,
 }
 
 impl Tile {
-    const EMPTY: Self = Self { cells: [Cell { sum: Exact::ZERO, squares: [0; 3] }; TILE_PIXELS], dropped: 0, cut: 0 };
+    const EMPTY: Self =
+        Self { cells: [Cell { sum: Exact::ZERO, squares: [0; 3] }; TILE_PIXELS], block_squares: [0; 3], dropped: 0, cut: 0 };
 
     /// Adds what one pass found at all pixels of the tile, and empties the buffer for the next pass.
     pub fn commit(&mut self, pass: &mut TileBuffer) {
+        let mut block = Exact::ZERO;
         for (cell, x) in self.cells.iter_mut().zip(&mut pass.cells) {
             if !x.is_zero() {
+                block.add(*x);
                 cell.sum.add(*x);
-                for (s, v) in cell.squares.iter_mut().zip(x.0) {
-                    *s = s.wrapping_add(exact::square(v));
-                }
+                add_squares(&mut cell.squares, *x);
                 *x = Exact::ZERO;
             }
         }
+        add_squares(&mut self.block_squares, block);
         self.dropped += std::mem::take(&mut pass.dropped);
         self.cut += std::mem::take(&mut pass.cut);
     }
@@ -91,8 +99,18 @@ impl Tile {
                 *s = s.wrapping_add(v);
             }
         }
+        for (s, v) in self.block_squares.iter_mut().zip(other.block_squares) {
+            *s = s.wrapping_add(v);
+        }
         self.dropped += other.dropped;
         self.cut += other.cut;
+    }
+}
+
+#[inline]
+fn add_squares(squares: &mut [u128; 3], x: Exact) {
+    for (s, v) in squares.iter_mut().zip(x.0) {
+        *s = s.wrapping_add(exact::square(v));
     }
 }
 
@@ -238,20 +256,35 @@ impl Film {
     /// Variance of [`Film::mean`] per pixel and channel, from the sample variance over passes;
     /// infinite with less than two passes.
     pub fn variance_of_mean(&self) -> Vec<[f32; 3]> {
+        self.map_pixels(|cell| self.variance(cell.sum, cell.squares, 1))
+    }
+
+    /// For every pixel, row by row, the variance of the mean over the pixels of its tile: what the
+    /// pixels of a tile have in common included. Infinite with less than two passes.
+    pub fn variance_of_tile_mean(&self) -> Vec<[f32; 3]> {
+        let of_tile = |(i, tile): (usize, &Tile)| {
+            let mut sum = Exact::ZERO;
+            tile.cells.iter().for_each(|c| sum.add(c.sum));
+            let rect = self.layout.tile_rect(i);
+            self.variance(sum, tile.block_squares, rect.width * rect.height)
+        };
+        let tiles: Vec<_> = self.tiles.par_iter().enumerate().map(of_tile).collect();
+        self.map_numbers(|p| tiles[Layout::tile_of(p)])
+    }
+
+    /// Variance of `Σ x / (n · parts)` from Σ x and Σ x² over the n passes.
+    fn variance(&self, sum: Exact, squares: [u128; 3], parts: u32) -> [f32; 3] {
         let n = self.passes.count() as f64;
-        let unit = exact::power_of_two(self.exponent);
-        let square_step = exact::power_of_two(-exact::SQUARE_FRACTION_BITS);
-        self.map_pixels(|cell| {
-            // In units of 2^e, so that no square leaves the range of f64.
-            let sums = cell.sum.to_f64(0);
-            std::array::from_fn(|c| {
-                if n < 2.0 {
-                    return f32::INFINITY;
-                }
-                let squares = cell.squares[c] as f64 * square_step;
-                let spread = (squares - sums[c] * sums[c] / n).max(0.0);
-                (spread / (n * (n - 1.0)) * unit * unit) as f32
-            })
+        if n < 2.0 {
+            return [f32::INFINITY; 3];
+        }
+        // In units of 2^e, so that no square leaves the range of f64.
+        let sum = sum.to_f64(0);
+        let unit = exact::power_of_two(self.exponent) / f64::from(parts);
+        std::array::from_fn(|c| {
+            let squares = squares[c] as f64 * exact::power_of_two(-exact::SQUARE_FRACTION_BITS);
+            let spread = (squares - sum[c] * sum[c] / n).max(0.0);
+            (spread / (n * (n - 1.0)) * unit * unit) as f32
         })
     }
 
@@ -262,12 +295,16 @@ impl Film {
     }
 
     fn map_pixels(&self, f: impl Fn(&Cell) -> [f32; 3] + Sync) -> Vec<[f32; 3]> {
+        self.map_numbers(|p| f(&self.tiles[Layout::tile_of(p)].cells[Layout::local_of(p)]))
+    }
+
+    /// A function of pixel numbers, row by row.
+    fn map_numbers(&self, f: impl Fn(u32) -> [f32; 3] + Sync) -> Vec<[f32; 3]> {
         let width = self.layout.width as usize;
         let mut out = vec![[0.0; 3]; width * self.layout.height as usize];
         out.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
             for (x, o) in row.iter_mut().enumerate() {
-                let p = self.layout.pixel(x as u32, y as u32);
-                *o = f(&self.tiles[Layout::tile_of(p)].cells[Layout::local_of(p)]);
+                *o = f(self.layout.pixel(x as u32, y as u32));
             }
         });
         out
@@ -397,6 +434,34 @@ mod tests {
             assert_eq!(film.mean()[0][c], mean as f32);
             assert!((f64::from(film.variance_of_mean()[0][c]) - variance).abs() <= 1e-9 * variance + 1e-15);
         }
+    }
+
+    /// Pixels that always move together: the variance of a tile's mean is that of one pixel, not a
+    /// 256th of it.
+    #[test]
+    fn what_pixels_have_in_common_counts() {
+        let n = 40;
+        let mut film = Film::new(20, 16, 1).unwrap();
+        for p in 0..n {
+            let mut r = Random::new(Family::Other, 0, p, 3);
+            let together = r.unit();
+            film.tiles_mut().for_each(|(t, rect, tile)| {
+                let mut buffer = TileBuffer::new(1);
+                for (x, y, local) in rect.pixels() {
+                    let own = Random::new(Family::Other, u64::from(1 + y * 20 + x), p, 3).unit();
+                    buffer.add(local, [together, own, if t == 0 { 1.0 } else { 0.0 }]);
+                }
+                tile.commit(&mut buffer);
+            });
+        }
+        film.add_passes(0..n).unwrap();
+        let (of_pixel, of_tile) = (film.variance_of_mean()[5], film.variance_of_tile_mean()[5]);
+        assert!((of_tile[0] / of_pixel[0] - 1.0).abs() < 1e-5);
+        assert!((256.0 * of_tile[1] / of_pixel[1] - 1.0).abs() < 0.7);
+        assert_eq!(of_tile[2], 0.0);
+        // The other tile is narrower.
+        let narrow = film.variance_of_tile_mean()[18];
+        assert!((narrow[0] / of_pixel[0] - 1.0).abs() < 1e-5);
     }
 
     #[test]

@@ -150,7 +150,8 @@ mod tests {
             assert!((v.energy_tested - 1.0).abs() < 1e-12);
             smallest = smallest.min(v.p);
         }
-        assert!(smallest > 1e-3, "{smallest}");
+        // The smallest of 20 uniform numbers is below this with probability 1e-4.
+        assert!(smallest > 5e-6, "{smallest}");
         let mut other = means.clone();
         other[11] *= 1.4;
         assert!(agreement(&series(1, &means, 8), &series(2, &other, 8)).p < 1e-4);

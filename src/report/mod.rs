@@ -28,6 +28,9 @@ pub struct Picture {
     pub mean: Vec<[f32; 3]>,
     /// Variance of each number of `mean`.
     pub variance: Option<Vec<[f32; 3]>>,
+    /// At every pixel, the variance of the mean over its block of 16 × 16 pixels, counted from the left
+    /// upper corner; with what the pixels of a block have in common.
+    pub block_variance: Option<Vec<[f32; 3]>>,
     /// Independent samples that each number of `mean` is the mean of.
     pub samples: Option<u64>,
 }

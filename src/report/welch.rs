@@ -1,6 +1,9 @@
 //! Whether two images, each with its variance, have the same expectation: Welch's test per block,
 //! `t = (Σ a − Σ b) / √(Σ var a + Σ var b)` over the pixels of a block and channel, Šidák over all.
 //!
+//! The variance of a block is that of its mean where the images carry it (connections and splats make
+//! the pixels of a pass depend on each other), else the sum over pixels taken as independent.
+//!
 //! Blocks are 16 × 16 pixels. A mean of few effective samples, `n_eff = (Σx)²/Σx²` over all samples
 //! of the block, is not near a normal distribution; such a block is pooled with the next along a
 //! path that winds through the image, until the pool has enough on both sides. A rest that never
@@ -38,7 +41,7 @@ pub struct Welch {
 struct Sums {
     mean: f64,
     variance: f64,
-    /// Σ variance² for the degrees of freedom.
+    /// Σ variance² of what is independent (pixels or blocks), for the degrees of freedom.
     variance_squared: f64,
     /// Σ x² of single samples, over the number of samples.
     square: f64,
@@ -125,6 +128,7 @@ fn pool(blocks: Vec<Pool>, enough: impl Fn(&Pool) -> bool) -> (Vec<Pool>, Option
 fn block(p: &Picture, at: [u32; 2], n: f64) -> [Sums; 3] {
     let mut out = [Sums::default(); 3];
     let Some(variances) = &p.variance else { return out };
+    let size = f64::from((p.width - at[0]).min(BLOCK)) * f64::from((p.height - at[1]).min(BLOCK));
     for y in at[1]..(at[1] + BLOCK).min(p.height) {
         for x in at[0]..(at[0] + BLOCK).min(p.width) {
             let i = y as usize * p.width as usize + x as usize;
@@ -136,6 +140,17 @@ fn block(p: &Picture, at: [u32; 2], n: f64) -> [Sums; 3] {
                     let square = (n - 1.0) * variance + mean * mean;
                     o.add(Sums { mean, variance, variance_squared: variance * variance, square });
                 }
+            }
+        }
+    }
+    let first = at[1] as usize * p.width as usize + at[0] as usize;
+    if let Some(of_block) = p.block_variance.as_ref().and_then(|b| b.get(first)) {
+        for (o, v) in out.iter_mut().zip(of_block) {
+            let variance = f64::from(*v) * size * size;
+            if variance.is_finite() {
+                let rounding = (o.mean * f64::from(f32::EPSILON)).powi(2);
+                o.variance = variance + rounding;
+                o.variance_squared = o.variance * o.variance;
             }
         }
     }
@@ -225,6 +240,24 @@ mod tests {
         // One side black everywhere: nothing can be tested, and the report says so.
         let w = welch(&black, &picture(2, 16, dark)).unwrap();
         assert_eq!((w.tests, w.energy_tested), (0, 0.0));
+    }
+
+    /// Pixels that move together make a block vary more than their own variances tell.
+    #[test]
+    fn the_variance_of_blocks_is_believed() {
+        let a = Picture {
+            width: 16,
+            height: 16,
+            mean: vec![[1.0; 3]; 256],
+            variance: Some(vec![[0.01; 3]; 256]),
+            block_variance: None,
+            samples: Some(100),
+        };
+        let b = Picture { mean: vec![[1.1; 3]; 256], ..a.clone() };
+        assert!(welch(&a, &b).unwrap().p < 1e-9);
+        let together = |p: &Picture| Picture { block_variance: p.variance.clone(), ..p.clone() };
+        let w = welch(&together(&a), &together(&b)).unwrap();
+        assert!((w.largest_t - 0.1 / 0.02f64.sqrt()).abs() < 1e-4 && w.p > 0.5, "{w:?}");
     }
 
     #[test]
