@@ -2,6 +2,7 @@
 
 use super::units;
 use crate::report::comparison::Metric;
+use crate::transport::mis::Heuristic;
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -82,13 +83,22 @@ pub enum TechniqueName {
 }
 
 /// Heuristics of multiple importance sampling by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum HeuristicName {
     /// Weights in proportion to densities.
     Balance,
     /// Weights in proportion to squared densities.
-    #[default]
     Power,
+}
+
+/// The library's own.
+impl Default for HeuristicName {
+    fn default() -> Self {
+        match Heuristic::default() {
+            Heuristic::Balance => Self::Balance,
+            Heuristic::Power => Self::Power,
+        }
+    }
 }
 
 /// How to render.
