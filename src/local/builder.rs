@@ -6,6 +6,7 @@ use super::conductor::IndexModel;
 use super::material::{Lobes, Side};
 use super::microfacet::Microfacet;
 use super::rough_conductor::RoughnessModel;
+use super::rough_plastic::Coat;
 use super::{
     blend, conductor, dielectric, diffuse, mask, null, plastic, rough_conductor, rough_dielectric, rough_plastic,
     thin_dielectric, two_sided,
@@ -15,6 +16,7 @@ use crate::describe::{
 };
 use crate::texture::{TextureSlot, Textures};
 use glam::Vec2;
+use std::sync::Arc;
 
 /// What is needed while materials are built.
 pub(super) struct Builder<'a> {
@@ -28,6 +30,8 @@ pub(super) struct Builder<'a> {
     path: Vec<BsdfId>,
     /// Elements of the present tree seen so far.
     visited: usize,
+    /// Tables of rough coats made so far.
+    coats: Vec<Arc<Coat>>,
 }
 
 /// Most elements in the tree of one material: shared elements may make a tree that grows without
@@ -45,6 +49,7 @@ impl<'a> Builder<'a> {
             leaves: vec![None; bsdfs.len()],
             path: Vec::new(),
             visited: 0,
+            coats: Vec::new(),
         }
     }
 
@@ -201,13 +206,24 @@ impl<'a> Builder<'a> {
                     self.problems.error(place, "`alpha` is not finite");
                     return None;
                 }
-                let facets = Microfacet::new(*distribution, Vec2::splat(*alpha));
-                rough_plastic::Model::new(facets, eta, *nonlinear, [diffuse, specular], &self.textures).into()
+                let coat = self.coat(*distribution, *alpha, eta);
+                rough_plastic::Model::new(coat, *nonlinear, [diffuse, specular], &self.textures).into()
             }
             BsdfModel::Null => null::Model.into(),
             // The three that combine others are taken apart before this is asked.
             BsdfModel::TwoSided { .. } | BsdfModel::Mask { .. } | BsdfModel::Blend { .. } => return None,
         })
+    }
+
+    /// The coat of these parameters, made once for all models that have it.
+    fn coat(&mut self, distribution: MicrofacetDescription, alpha: f32, eta: f32) -> Arc<Coat> {
+        let facets = Microfacet::new(distribution, Vec2::splat(alpha));
+        if let Some(coat) = self.coats.iter().find(|coat| coat.is(facets, eta)) {
+            return coat.clone();
+        }
+        let coat = Arc::new(Coat::new(facets, eta));
+        self.coats.push(coat.clone());
+        coat
     }
 
     /// A texture that must not be negative where it is constant.

@@ -101,7 +101,7 @@ impl Lobe for RoughConductor {
         let (back, next) = (self.facets.masking(w_back), self.facets.masking(w_next));
         let reflected = self.index.reflected(w_back.dot(m).abs());
         Evaluation {
-            f: self.reflectance * reflected * (quarter_d * back.g * next.g),
+            f: self.reflectance * reflected * (quarter_d * back.g() * next.g()),
             p_w: quarter_d * back.visible,
             p_w_rev: quarter_d * next.visible,
         }
@@ -119,7 +119,7 @@ impl Lobe for RoughConductor {
     fn sample(&self, _: Equation, w_back: Vec3, _: f32, u: Vec2) -> Option<Sample> {
         let r = FacetReflection::sample(&self.facets, w_back, u)?;
         let next = self.facets.masking(r.w_next);
-        let masked = r.value_over_density * next.g * r.w_next.z.abs();
+        let masked = r.ratio * next.g() * r.w_next.z.abs();
         let weight = self.reflectance * self.index.reflected(r.cos) * masked;
         Some(Sample::smooth(r.w_next, weight, r.p, r.quarter_d * next.visible))
     }
@@ -154,8 +154,8 @@ pub(super) struct FacetReflection {
     pub quarter_d: f32,
     /// Density of `w_next`.
     pub p: f32,
-    /// The model's masking of `w_back` over the sampler's: 1 for GGX.
-    pub value_over_density: f32,
+    /// The model's masking of `w_back` over the exact one.
+    pub ratio: f32,
 }
 
 impl FacetReflection {
@@ -179,6 +179,6 @@ impl FacetReflection {
             return None;
         }
         w_next.z = w_next.z.copysign(w_back.z);
-        Some(Self { w_next, cos, quarter_d, p, value_over_density: back.g / back.visible })
+        Some(Self { w_next, cos, quarter_d, p, ratio: back.ratio })
     }
 }

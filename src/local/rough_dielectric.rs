@@ -134,7 +134,7 @@ impl Lobe for RoughDielectric {
             (false, Equation::Potential) => (self.transmittance, eta2, eta2),
         };
         Evaluation {
-            f: scale * (shared * back.g * next.g * n_o2),
+            f: scale * (shared * back.g() * next.g() * n_o2),
             p_w: shared * back.visible * p_scale,
             p_w_rev: shared * next.visible,
         }
@@ -165,7 +165,7 @@ impl Lobe for RoughDielectric {
         let facet = Facet { d: self.facets.d(m), cos_back, cos_next, b, reflects };
         let shared = Self::shared_density(&facet);
         let (back, next) = (self.facets.masking(w_back), self.facets.masking(w_next));
-        let masked = back.g / back.visible * next.g * w_next.z.abs();
+        let masked = back.ratio * next.g() * w_next.z.abs();
         let (weight, p_scale, eta) = match (reflects, equation) {
             (true, _) => (self.reflectance * masked, 1.0, 1.0),
             (false, Equation::Rendering) => (self.transmittance * (masked * b.inv_eta * b.inv_eta), b.eta * b.eta, b.eta),

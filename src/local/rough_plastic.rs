@@ -35,12 +35,20 @@ const RESOLUTION: usize = 64;
 /// The coat as the base sees it.
 #[derive(Debug)]
 pub struct Coat {
+    facets: Microfacet,
+    eta: f32,
+    inv_eta: f32,
     transmittance: [f32; RESOLUTION],
     inside: f32,
 }
 
 impl Coat {
-    /// For facets and a relative index `eta` of the coat.
+    /// Is it that of these parameters?
+    pub fn is(&self, facets: Microfacet, eta: f32) -> bool {
+        self.facets == facets && self.eta == eta
+    }
+
+    /// For facets and the index `eta`, not 1, of the coat over that outside.
     pub fn new(facets: Microfacet, eta: f32) -> Self {
         let directions: Vec<Vec3> = (0..RESOLUTION)
             .map(|i| (i as f32 / (RESOLUTION - 1) as f32).max(1e-6))
@@ -52,7 +60,7 @@ impl Coat {
         let inside: Vec<f32> = directions.par_iter().map(|w| reflected(&facets, *w, 1.0 / eta, &inner) * w.z).collect();
         let mut transmittance = [0.0; RESOLUTION];
         transmittance.copy_from_slice(&table);
-        Self { transmittance, inside: 2.0 * inside.iter().sum::<f32>() / RESOLUTION as f32 }
+        Self { facets, eta, inv_eta: 1.0 / eta, transmittance, inside: 2.0 * inside.iter().sum::<f32>() / RESOLUTION as f32 }
     }
 
     /// Share of light from a direction of cosine `cos` that reaches the base.
@@ -92,41 +100,38 @@ fn gauss_legendre(n: usize) -> Vec<(f32, f32)> {
         .collect()
 }
 
-/// ∫ over the unit square of `value(m)` for facets m visible from `w`.
-fn over_visible(facets: &Microfacet, w: Vec3, nodes: &[(f32, f32)], value: impl Fn(Vec3) -> f32) -> f32 {
-    let mut sum = 0.0;
-    for (v, weight_v) in nodes {
-        for (u, weight_u) in nodes {
-            sum += weight_u * weight_v * value(facets.sample_visible_tabulated(w, Vec2::new(*u, *v)));
-        }
-    }
-    sum
-}
-
 /// Share of light from `w` that facets refract to the other side, masked there.
 fn transmitted(facets: &Microfacet, w: Vec3, eta: f32, nodes: &[(f32, f32)]) -> f32 {
-    over_visible(facets, w, nodes, |m| {
+    let inv_eta = 1.0 / eta;
+    let mut sum = 0.0;
+    facets.visit_visible(w, nodes, |m, weight| {
         let cos = w.dot(m);
-        let b = boundary(cos, eta, 1.0 / eta);
+        let b = boundary(cos, eta, inv_eta);
         let out = b.refract_at(w, m, cos);
-        if out.z < 0.0 && out.dot(m) < 0.0 { facets.masking(out).g * out.z.abs() * (1.0 - b.reflected) } else { 0.0 }
-    })
+        if out.z < 0.0 && out.dot(m) < 0.0 {
+            sum += weight * facets.masking(out).g() * out.z.abs() * (1.0 - b.reflected);
+        }
+    });
+    sum
 }
 
 /// Share of light from `w` that facets mirror to the same side, masked there.
 fn reflected(facets: &Microfacet, w: Vec3, eta: f32, nodes: &[(f32, f32)]) -> f32 {
-    over_visible(facets, w, nodes, |m| {
+    let inv_eta = 1.0 / eta;
+    let mut sum = 0.0;
+    facets.visit_visible(w, nodes, |m, weight| {
         let cos = w.dot(m);
         let out = 2.0 * cos * m - w;
-        if out.z > 0.0 && cos > 0.0 { facets.masking(out).g * out.z * dielectric(cos, eta, 1.0 / eta) } else { 0.0 }
-    })
+        if out.z > 0.0 && cos > 0.0 {
+            sum += weight * facets.masking(out).g() * out.z * dielectric(cos, eta, inv_eta);
+        }
+    });
+    sum
 }
 
 /// Rough plastic with its textures.
 #[derive(Clone, Debug)]
 pub struct Model {
-    facets: Microfacet,
-    eta: f32,
     nonlinear: bool,
     coat_share: f32,
     diffuse: TextureSlot,
@@ -135,16 +140,13 @@ pub struct Model {
 }
 
 impl Model {
-    /// `eta` is the index of the coat over that outside, not 1.
-    pub fn new(
-        facets: Microfacet,
-        eta: f32,
-        nonlinear: bool,
-        [diffuse, specular]: [TextureSlot; 2],
-        textures: &Textures,
-    ) -> Self {
-        let coat_share = coat_share(diffuse, specular, textures);
-        Self { facets, eta, nonlinear, coat_share, diffuse, specular, coat: Arc::new(Coat::new(facets, eta)) }
+    /// A base under a coat.
+    pub fn new(coat: Arc<Coat>, nonlinear: bool, [diffuse, specular]: [TextureSlot; 2], textures: &Textures) -> Self {
+        Self { nonlinear, coat_share: coat_share(diffuse, specular, textures), diffuse, specular, coat }
+    }
+
+    fn base(&self, reflectance: Spectrum) -> Spectrum {
+        base(reflectance, self.nonlinear, self.coat.inside, self.coat.inv_eta)
     }
 }
 
@@ -154,8 +156,6 @@ pub struct RoughPlastic<'a> {
     base: Spectrum,
     specular: Spectrum,
     coat: &'a Coat,
-    facets: Microfacet,
-    eta: f32,
     coat_share: f32,
 }
 
@@ -165,11 +165,9 @@ impl Textured for Model {
     #[inline]
     fn resolve<'a>(&'a self, textures: &'a Textures, uv: Vec2) -> RoughPlastic<'a> {
         RoughPlastic {
-            base: base(textures.eval(self.diffuse, uv), self.nonlinear, self.coat.inside, 1.0 / self.eta),
+            base: self.base(textures.eval(self.diffuse, uv)),
             specular: textures.eval(self.specular, uv),
             coat: &self.coat,
-            facets: self.facets,
-            eta: self.eta,
             coat_share: self.coat_share,
         }
     }
@@ -179,8 +177,7 @@ impl Textured for Model {
     }
 
     fn albedo_bound(&self, textures: &Textures) -> Spectrum {
-        let most = base(textures.max(self.diffuse), self.nonlinear, self.coat.inside, 1.0 / self.eta);
-        textures.max(self.specular).lane_max(most)
+        textures.max(self.specular).lane_max(self.base(textures.max(self.diffuse)))
     }
 }
 
@@ -201,12 +198,12 @@ impl Lobe for RoughPlastic<'_> {
         }
         let (c_back, c_next) = (w_back.z.abs(), w_next.z.abs());
         let m = half_direction(w_back, w_next);
-        let quarter_d = 0.25 * self.facets.d(m);
-        let (back, next) = (self.facets.masking(w_back), self.facets.masking(w_next));
-        let reflected = dielectric(w_back.dot(m).abs(), self.eta, 1.0 / self.eta);
+        let quarter_d = 0.25 * self.coat.facets.d(m);
+        let (back, next) = (self.coat.facets.masking(w_back), self.coat.facets.masking(w_next));
+        let reflected = dielectric(w_back.dot(m).abs(), self.coat.eta, self.coat.inv_eta);
         let ((coat_back, t_back), (coat_next, t_next)) = (self.coat(c_back), self.coat(c_next));
         Evaluation {
-            f: self.specular * (reflected * quarter_d * back.g * next.g) + self.base * (FRAC_1_PI * t_back * t_next),
+            f: self.specular * (reflected * quarter_d * back.g() * next.g()) + self.base * (FRAC_1_PI * t_back * t_next),
             p_w: coat_back * quarter_d * back.visible + (1.0 - coat_back) * c_next * FRAC_1_PI,
             p_w_rev: coat_next * quarter_d * next.visible + (1.0 - coat_next) * c_back * FRAC_1_PI,
         }
@@ -217,9 +214,9 @@ impl Lobe for RoughPlastic<'_> {
         if w_back.z * w_next.z <= 0.0 {
             return 0.0;
         }
-        let quarter_d = 0.25 * self.facets.d(half_direction(w_back, w_next));
+        let quarter_d = 0.25 * self.coat.facets.d(half_direction(w_back, w_next));
         let (coat, _) = self.coat(w_back.z.abs());
-        coat * quarter_d * self.facets.masking(w_back).visible + (1.0 - coat) * w_next.z.abs() * FRAC_1_PI
+        coat * quarter_d * self.coat.facets.masking(w_back).visible + (1.0 - coat) * w_next.z.abs() * FRAC_1_PI
     }
 
     #[inline]
@@ -229,7 +226,7 @@ impl Lobe for RoughPlastic<'_> {
         }
         let (coat, _) = self.coat(w_back.z.abs());
         let w_next = if u_lobe < coat {
-            FacetReflection::sample(&self.facets, w_back, u)?.w_next
+            FacetReflection::sample(&self.coat.facets, w_back, u)?.w_next
         } else {
             let w = hemisphere_cosine(u);
             Vec3::new(w.x, w.y, w.z.copysign(w_back.z))
@@ -249,6 +246,6 @@ impl Lobe for RoughPlastic<'_> {
     /// That of the coat.
     #[inline]
     fn roughness(&self) -> f32 {
-        self.facets.roughness()
+        self.coat.facets.roughness()
     }
 }

@@ -9,28 +9,41 @@ use std::f32::consts::{FRAC_1_PI, PI};
 /// Largest float below one.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// Unit disk, uniform and without distortion of strata [Shirley & Chiu 1997].
+/// (sin, cos) of `t·π/4` for |t| ≤ 1, to one unit in the last place of 1: the first terms of the
+/// series, which is all that f32 can hold there, at a third of the cost of a library call.
 #[inline]
-pub fn disk_concentric(u: Vec2) -> Vec2 {
-    let o = 2.0 * u - Vec2::ONE;
-    if o == Vec2::ZERO {
-        return Vec2::ZERO;
-    }
-    // Beyond the diagonal the angle is π/2 − φ: sine and cosine change places.
-    let swapped = o.x.abs() <= o.y.abs();
-    let (r, phi) = if swapped { (o.y, (PI / 4.0) * (o.x / o.y)) } else { (o.x, (PI / 4.0) * (o.y / o.x)) };
-    let (s, c) = sin_cos_small(phi);
-    if swapped { Vec2::new(r * s, r * c) } else { Vec2::new(r * c, r * s) }
-}
-
-/// Sine and cosine of |x| ≤ π/4 by their series, to 1 ulp or so: several times faster than the
-/// general functions, and the same on every machine.
-#[inline]
-fn sin_cos_small(x: f32) -> (f32, f32) {
+fn sin_cos_eighth(t: f32) -> (f32, f32) {
+    const Q: f32 = PI / 4.0;
+    let x = t * Q;
     let x2 = x * x;
     let sin = x + x * x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0))));
     let cos = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0))));
     (sin, cos)
+}
+
+/// (sin, cos) of `2πu` for u in [0, 1]. Without a library call, also where there is no instruction for
+/// rounding.
+#[inline]
+pub fn sin_cos_turn(u: f32) -> (f32, f32) {
+    let quarters = 4.0 * u;
+    let q = (quarters + 0.5) as i32;
+    let (s, c) = sin_cos_eighth(2.0 * (quarters - q as f32));
+    let (s, c) = if q & 1 == 0 { (s, c) } else { (c, -s) };
+    if q & 2 == 0 { (s, c) } else { (-s, -c) }
+}
+
+/// Unit disk, uniform and without distortion of strata [Shirley & Chiu 1997].
+///
+/// Written without a branch on the sector, which no predictor could guess.
+#[inline]
+pub fn disk_concentric(u: Vec2) -> Vec2 {
+    let o = 2.0 * u - Vec2::ONE;
+    let flat = o.x.abs() > o.y.abs();
+    let (r, across) = if flat { (o.x, o.y) } else { (o.y, o.x) };
+    let safe = if r == 0.0 { 1.0 } else { r };
+    let (s, c) = sin_cos_eighth(across / safe);
+    let (along, aside) = (r * c, r * s);
+    if flat { Vec2::new(along, aside) } else { Vec2::new(aside, along) }
 }
 
 /// Cosine-weighted hemisphere around +z: `p_w = cosθ / π`.
@@ -51,7 +64,7 @@ pub fn hemisphere_cosine_p_w(cos: f32) -> f32 {
 pub fn sphere_uniform(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
     let r = (1.0 - z * z).max(0.0).sqrt();
-    let (s, c) = (2.0 * PI * u.y).sin_cos();
+    let (s, c) = sin_cos_turn(u.y);
     Vec3::new(r * c, r * s, z)
 }
 
@@ -64,7 +77,7 @@ pub fn cone_uniform(u: Vec2, cos_max: f32) -> Vec3 {
     let one_minus_cos = u.x * (1.0 - cos_max);
     let z = 1.0 - one_minus_cos;
     let r = (one_minus_cos * (1.0 + z)).max(0.0).sqrt();
-    let (s, c) = (2.0 * PI * u.y).sin_cos();
+    let (s, c) = sin_cos_turn(u.y);
     Vec3::new(r * c, r * s, z)
 }
 
@@ -79,4 +92,31 @@ pub fn cone_uniform_p_w(cos_max: f32) -> f32 {
 pub fn triangle_uniform(u: Vec2) -> Vec2 {
     let t = (1.0 - u.x).max(0.0).sqrt();
     Vec2::new(1.0 - t, t * u.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_those_of_the_library() {
+        for i in 0..=100_000 {
+            let u = i as f32 / 100_000.0;
+            let (s, c) = sin_cos_turn(u);
+            let exact = (2.0 * std::f64::consts::PI * f64::from(u)).sin_cos();
+            assert!((f64::from(s) - exact.0).abs() < 1.5e-7 && (f64::from(c) - exact.1).abs() < 1.5e-7, "{u}: {s} {c}");
+        }
+    }
+
+    #[test]
+    fn disk_is_concentric() {
+        for (u, expected) in
+            [((0.5, 0.5), (0.0, 0.0)), ((1.0, 0.5), (1.0, 0.0)), ((0.5, 0.0), (0.0, -1.0)), ((0.0, 0.5), (-1.0, 0.0))]
+        {
+            let d = disk_concentric(Vec2::new(u.0, u.1));
+            assert!((d - Vec2::new(expected.0, expected.1)).length() < 1e-6, "{u:?}: {d}");
+        }
+        let corner = disk_concentric(Vec2::new(1.0, 0.0));
+        assert!((corner - Vec2::new(0.5f32.sqrt(), -(0.5f32.sqrt()))).length() < 1e-6, "{corner}");
+    }
 }

@@ -4,15 +4,16 @@
 //! the halves between it and a spherical cap of uniform mirror directions [Dupuy & Benyoub 2023]:
 //! one square root and one angle instead of a warped disk.
 
-use crate::math::warp::disk_concentric;
+use crate::math::warp::{disk_concentric, sin_cos_turn};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// Density of facet normals.
+/// Density of facet normals, with the only division at the end.
 #[inline]
 pub fn d(alpha: Vec2, m: Vec3) -> f32 {
-    let s = Vec3::new(m.x / alpha.x, m.y / alpha.y, m.z).length_squared();
-    1.0 / (PI * alpha.x * alpha.y * s * s)
+    let product = alpha.x * alpha.y;
+    let s = Vec3::new(m.x * alpha.y, m.y * alpha.x, m.z * product).length_squared();
+    product * product * product / (PI * s * s)
 }
 
 /// G₁/|cosθ| = 2 / (|cosθ| + √(cos²θ + α²sin²θ)), where `stretched` is α²sin²θ.
@@ -29,7 +30,7 @@ pub fn sample_visible(alpha: Vec2, w: Vec3, u: Vec2) -> Vec3 {
     let height = (1.0 - u.y) * (1.0 + s.z);
     let c_z = height - s.z;
     let r = (1.0 - c_z * c_z).max(0.0).sqrt();
-    let (sin, cos) = (2.0 * PI * u.x).sin_cos();
+    let (sin, cos) = sin_cos_turn(u.x);
     let h = Vec3::new(s.x + r * cos, s.y + r * sin, height);
     (h * alpha.extend(1.0)).normalize()
 }

@@ -5,8 +5,8 @@
 //! direction, p(m) = D(m) G₁(w) |w·m| / |cosθ| [Heitz & d'Eon 2014].
 //!
 //! Masking is always needed over the cosine, and that quotient stays finite at grazing angles:
-//! [`Masking`] holds it twice, once as the model is defined (Mitsuba's rational fit of Beckmann's G₁,
-//! off by up to 0.35 %) and once exactly, since a density must be that of the sampler.
+//! [`Masking`] holds it exactly, since a density must be that of the sampler, together with the ratio
+//! of the model's value to it: Mitsuba's rational fit of Beckmann's G₁ is off by up to 0.35 %.
 
 pub mod beckmann;
 pub mod ggx;
@@ -18,7 +18,7 @@ use glam::{Vec2, Vec3};
 pub const LEAST_ALPHA: f32 = 1e-4;
 
 /// A distribution of facet normals.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Microfacet {
     kind: MicrofacetDescription,
     /// Roughness along x and y.
@@ -28,10 +28,18 @@ pub struct Microfacet {
 /// Smith's masking of one direction, divided by the cosine of that direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Masking {
-    /// G₁/|cosθ| in the model's value.
-    pub g: f32,
-    /// G₁/|cosθ| that normalises the visible facets.
+    /// G₁/|cosθ|, normalises the visible facets.
     pub visible: f32,
+    /// G₁ as the model has it over the exact one: 1 for GGX.
+    pub ratio: f32,
+}
+
+impl Masking {
+    /// G₁/|cosθ| as the model has it.
+    #[inline]
+    pub fn g(self) -> f32 {
+        self.visible * self.ratio
+    }
 }
 
 impl Microfacet {
@@ -64,10 +72,7 @@ impl Microfacet {
         let cos = w.z.abs();
         let stretched = (self.alpha * w.truncate()).length_squared();
         match self.kind {
-            MicrofacetDescription::Ggx => {
-                let g = ggx::g1_over_cos(cos, stretched);
-                Masking { g, visible: g }
-            }
+            MicrofacetDescription::Ggx => Masking { visible: ggx::g1_over_cos(cos, stretched), ratio: 1.0 },
             MicrofacetDescription::Beckmann => beckmann::masking(cos, stretched),
         }
     }
@@ -81,12 +86,29 @@ impl Microfacet {
         }
     }
 
-    /// The same with the map of the unit square that Mitsuba 3 uses, for tables made by quadrature
-    /// in it.
-    pub(super) fn sample_visible_tabulated(&self, w: Vec3, u: Vec2) -> Vec3 {
+    /// Visits facet normals visible from `w` at all pairs of `nodes` (point of [0, 1], weight), each
+    /// with the product of its weights: a quadrature over the visible facets, in the map of the unit
+    /// square that Mitsuba 3 uses.
+    pub(super) fn visit_visible(&self, w: Vec3, nodes: &[(f32, f32)], mut visit: impl FnMut(Vec3, f32)) {
         match self.kind {
-            MicrofacetDescription::Ggx => ggx::sample_visible_by_disk(self.alpha, w, u),
-            MicrofacetDescription::Beckmann => beckmann::sample_visible(self.alpha, w, u),
+            MicrofacetDescription::Ggx => {
+                for (v, weight_v) in nodes {
+                    for (u, weight_u) in nodes {
+                        visit(ggx::sample_visible_by_disk(self.alpha, w, Vec2::new(*u, *v)), weight_u * weight_v);
+                    }
+                }
+            }
+            MicrofacetDescription::Beckmann => {
+                let facets = beckmann::VisibleSlopes::new(self.alpha, w);
+                // The two slopes are independent: as many inversions as nodes, not as pairs of them.
+                let across: Vec<f32> = nodes.iter().map(|(v, _)| beckmann::VisibleSlopes::across(*v)).collect();
+                for (u, weight_u) in nodes {
+                    let along = facets.along(*u);
+                    for (across, (_, weight_v)) in across.iter().zip(nodes) {
+                        visit(facets.normal(Vec2::new(along, *across)), weight_u * weight_v);
+                    }
+                }
+            }
         }
     }
 }
