@@ -124,13 +124,13 @@ fn blocks_are_constant(picture: &nephroid::render::Picture, estimator: Estimator
 #[test]
 fn constant_radiance_by_gathering() {
     let dir = tempfile::tempdir().unwrap();
-    radiance_is_constant(&furnace(dir.path()), Estimator::Gather, 512);
+    radiance_is_constant(&furnace(dir.path()), Estimator::Gather, 384);
 }
 
 #[test]
 fn constant_radiance_by_both_walkers() {
     let dir = tempfile::tempdir().unwrap();
-    radiance_is_constant(&furnace(dir.path()), Estimator::Bidirectional, 512);
+    radiance_is_constant(&furnace(dir.path()), Estimator::Bidirectional, 384);
 }
 
 /// A shooting walk sees no glass and no mirror directly; those pixels stay dark and are left out by
@@ -149,7 +149,7 @@ fn constant_radiance_by_shooting() {
     <bsdf type="diffuse"><rgb name="reflectance" value="0.7"/></bsdf><emitter type="area"><rgb name="radiance" value="0.3"/></emitter></shape>
 </scene>"#,
     );
-    radiance_is_constant(&world, Estimator::Shoot, 2048);
+    radiance_is_constant(&world, Estimator::Shoot, 1024);
 }
 
 /// x = 0.1 x + 1.8 as a scene: every path of n scatterings returns the same number, so hits alone
