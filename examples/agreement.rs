@@ -1,7 +1,9 @@
 //! Do gathering, shooting and both together measure the same? Welch's test per block of 16 × 16 pixels
 //! over independent renders of a scene file, on the classes of paths that both sides can see.
-//! `cargo run --release --example agreement -- SCENE.xml [RENDERS] [PASSES] [SEED]`
+//! `cargo run --release --example agreement -- SCENE.xml [RENDERS] [PASSES] [SEED] [NAME=VALUE ...]`
+//! More passes per render make the draws more nearly normal, which the test assumes.
 
+use nephroid::io::mitsuba::LoadOptions;
 use nephroid::render::{Estimator, Options, Render};
 use nephroid::report::agreement::{BlockSeries, agreement};
 use nephroid::scene::Scene;
@@ -44,10 +46,12 @@ fn series(
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let scene = arguments.first().ok_or("usage: agreement SCENE.xml [RENDERS] [PASSES] [SEED]")?;
+    let scene = arguments.first().ok_or("usage: agreement SCENE.xml [RENDERS] [PASSES] [SEED] [NAME=VALUE ...]")?;
     let number = |i: usize, default| arguments.get(i).map_or(Ok(default), |n| n.parse::<u64>());
     let (renders, passes, seed) = (number(1, 40)?, number(2, 2)?, number(3, 1)?);
-    let scene = nephroid::load(Path::new(scene), &Default::default())?.scene;
+    let defines = arguments.iter().filter_map(|a| a.split_once('=')).map(|(n, v)| (n.to_owned(), v.to_owned())).collect();
+    let options = LoadOptions { defines, sandbox: None };
+    let scene = nephroid::load(Path::new(scene), &options)?.scene;
     use Estimator::{Bidirectional, Gather, Shoot};
     let mut agree = true;
     for (i, (a, b, paths)) in [
