@@ -33,7 +33,7 @@ fn main() {
     let robust = number("NEPHROID_EMBREE_FAST", 0) == 0;
     println!("{:8} {:>9} {:>5} {:>8} {:>8} {:>6}  differ", "room", "triangles", "rays", "ours", "Embree", "ratio");
     let mut ratios = vec![];
-    for room in [scenes::cornell(), scenes::knot(), scenes::hall()] {
+    for room in [scenes::tiny(), scenes::cornell(), scenes::knot(), scenes::hall()] {
         if wanted.as_ref().is_some_and(|w| w != room.name) {
             continue;
         }

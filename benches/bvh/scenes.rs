@@ -1,5 +1,5 @@
-//! Three meshes made in code: about 40 thousand, 70 thousand and a million triangles, each closed
-//! in a room, with a square light under the ceiling and a camera.
+//! Meshes made in code: 36, about 40 thousand, 70 thousand and a million triangles, each closed in a
+//! room, with a square light under the ceiling and a camera.
 
 use glam::{Mat3, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -39,15 +39,31 @@ impl Room {
     }
 
     fn walls(&mut self, half: Vec3) {
+        self.block(Vec3::ZERO, Mat3::from_diagonal(half));
+    }
+
+    /// The cube [-1, 1]³ under an affine map.
+    fn block(&mut self, center: Vec3, shape: Mat3) {
         for axis in 0..3 {
             for side in [-1.0, 1.0] {
                 let mut turn = [Vec3::ZERO; 3];
                 (0..3).for_each(|k| turn[k][(axis + k) % 3] = 1.0);
                 let m = Mat3::from_cols(turn[1], turn[2], turn[0]);
-                self.grid(1, 1, |u, v| half * (m * Vec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, side)));
+                self.grid(1, 1, |u, v| center + shape * (m * Vec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, side)));
             }
         }
     }
+}
+
+/// Two blocks in a box.
+pub fn tiny() -> Room {
+    let mut room = Room { name: "tiny", light: (Vec3::Y * 0.98, 0.25), ..Room::default() };
+    room.eye = (Vec3::new(0.0, 0.0, -0.98), Vec3::new(0.0, -0.2, 1.0));
+    room.walls(Vec3::ONE);
+    let turned = |angle: f32, half: Vec3| Mat3::from_rotation_y(angle) * Mat3::from_diagonal(half);
+    room.block(Vec3::new(-0.35, -0.4, 0.3), turned(0.3, Vec3::new(0.3, 0.6, 0.3)));
+    room.block(Vec3::new(0.4, -0.7, -0.2), turned(-0.3, Vec3::splat(0.3)));
+    room
 }
 
 /// Two spheres in a box.

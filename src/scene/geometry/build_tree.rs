@@ -1,15 +1,14 @@
 //! From boxes to the eight-wide tree.
 //!
-//! A binary tree by locally ordered clustering [Meister 2018a] improved by reinsertion
-//! [Meister 2018b] is collapsed by dynamic programming to the eight-wide tree of least
-//! expected cost [Ylitie 2017, sec. 3.1]: for each binary node the least cost of its subtree as a
-//! leaf, as a wide node, or spread over up to seven children of the wide node above.
+//! The binary tree over the items ([`super::binary`]) is collapsed by dynamic programming to the
+//! eight-wide tree of least expected cost [Ylitie 2017, sec. 3.1]: for each binary node the least cost
+//! of its subtree as a leaf, as a wide node, or spread over up to seven children of the wide node
+//! above.
 
+use super::binary::{self, Binary, BinaryKind};
 use super::ray::Aabb;
 use super::tree::{ANALYTIC, Block, EMPTY, INSTANCE, LEAF, Node, STACK, TRIANGLES};
 use glam::Vec3;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Cost of testing the eight boxes of a node, in arbitrary units.
 const NODE_COST: f64 = 1.0;
@@ -38,17 +37,6 @@ pub(super) struct Growing {
     pub(super) blocks: Vec<Block>,
 }
 
-/// A node of the binary tree.
-struct Binary {
-    bounds: Aabb,
-    kind: BinaryKind,
-}
-
-enum BinaryKind {
-    Leaf(u32),
-    Inner([u32; 2]),
-}
-
 impl Growing {
     /// Adds a tree over `items` and returns the code of its root.
     pub(super) fn add(&mut self, items: &[Item], bounds: &[Aabb]) -> u32 {
@@ -56,18 +44,19 @@ impl Growing {
             return EMPTY;
         }
         let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
-        let root = self.collapse(items, &clustered(bounds));
-        if self.need(root) <= STACK {
+        let root = self.collapse(items, &binary::tree(bounds));
+        // One place more for the child that is visited next, while its siblings are being sorted.
+        if self.need(root) < STACK {
             return root;
         }
         // A very lopsided tree (geometric progressions, many coincident boxes): halve instead.
         self.nodes.truncate(nodes);
         self.blocks.truncate(blocks);
-        self.collapse(items, &halved(bounds))
+        self.collapse(items, &binary::halved(bounds))
     }
 
     /// Most children that can wait at once below `code`.
-    fn need(&self, code: u32) -> usize {
+    pub(super) fn need(&self, code: u32) -> usize {
         if code & LEAF != 0 {
             return 0;
         }
@@ -82,7 +71,7 @@ impl Growing {
         need[0]
     }
 
-    fn collapse(&mut self, items: &[Item], binary: &[Binary]) -> u32 {
+    pub(super) fn collapse(&mut self, items: &[Item], binary: &[Binary]) -> u32 {
         let plan = Plan::new(items, binary);
         if plan.is_leaf(0) {
             return self.leaf(items, binary, 0);
@@ -227,82 +216,6 @@ impl Plan {
                 self.spread(binary, *r, k - left, out);
             }
             _ => out.push(at),
-        }
-    }
-}
-
-/// The binary tree by clustering and reinsertion, children after their parents.
-fn clustered(bounds: &[Aabb]) -> Vec<Binary> {
-    let all = bounds.iter().fold(Aabb::EMPTY, |a, b| a.union(*b));
-    // To a box of size about one at the origin: no overflow in the builder's areas.
-    let center = all.center();
-    let extent = (all.max - center).max_element();
-    let scale = if extent > 0.0 { 1.0 / extent } else { 1.0 };
-    let unit = |p: Vec3| ((p - center) * scale).to_vec3a();
-    let boxes: Vec<_> = bounds.iter().map(|b| obvhs::aabb::Aabb::new(unit(b.min), unit(b.max))).collect();
-    let indices = (0..boxes.len() as u32).collect();
-    let mut tree =
-        PlocBuilder::with_capacity(boxes.len()).build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
-    ReinsertionOptimizer::default().run(&mut tree, 0.1, None);
-    let mut out: Vec<Binary> = Vec::with_capacity(tree.nodes.len());
-    let mut waiting = vec![(0u32, None)];
-    while let Some((i, parent)) = waiting.pop() {
-        let node = &tree.nodes[i as usize];
-        let at = out.len() as u32;
-        if let Some((parent, side)) = parent
-            && let BinaryKind::Inner(children) = &mut out[parent as usize].kind
-        {
-            children[side] = at;
-        }
-        if node.is_leaf() {
-            let item = tree.primitive_indices[node.first_index as usize];
-            out.push(Binary { bounds: bounds[item as usize], kind: BinaryKind::Leaf(item) });
-        } else {
-            out.push(Binary { bounds: Aabb::EMPTY, kind: BinaryKind::Inner([0; 2]) });
-            waiting.extend([(node.first_index + 1, Some((at, 1usize))), (node.first_index, Some((at, 0)))]);
-        }
-    }
-    refit(&mut out);
-    out
-}
-
-/// The binary tree that halves the items by the middle of the widest spread of centres: depth
-/// log₂ n whatever the boxes.
-fn halved(bounds: &[Aabb]) -> Vec<Binary> {
-    let mut order: Vec<u32> = (0..bounds.len() as u32).collect();
-    let mut out = Vec::with_capacity(2 * bounds.len());
-    let mut waiting = vec![(0usize, bounds.len(), None)];
-    while let Some((from, to, parent)) = waiting.pop() {
-        let at = out.len() as u32;
-        if let Some((parent, side)) = parent {
-            let parent: &mut Binary = &mut out[parent as usize];
-            if let BinaryKind::Inner(children) = &mut parent.kind {
-                children[side] = at;
-            }
-        }
-        if to - from == 1 {
-            let item = order[from];
-            out.push(Binary { bounds: bounds[item as usize], kind: BinaryKind::Leaf(item) });
-            continue;
-        }
-        let spread = Aabb::around(order[from..to].iter().map(|i| bounds[*i as usize].center()));
-        let size = spread.max * 0.5 - spread.min * 0.5;
-        let axis = size.max_position();
-        let key = |i: &u32| bounds[*i as usize].center()[axis];
-        let middle = (to - from) / 2;
-        order[from..to].select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
-        out.push(Binary { bounds: Aabb::EMPTY, kind: BinaryKind::Inner([0; 2]) });
-        waiting.extend([(from + middle, to, Some((at, 1usize))), (from, from + middle, Some((at, 0)))]);
-    }
-    refit(&mut out);
-    out
-}
-
-/// Boxes of inner nodes from those of the leaves.
-fn refit(tree: &mut [Binary]) {
-    for i in (0..tree.len()).rev() {
-        if let BinaryKind::Inner([l, r]) = tree[i].kind {
-            tree[i].bounds = tree[l as usize].bounds.union(tree[r as usize].bounds);
         }
     }
 }

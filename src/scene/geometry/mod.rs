@@ -8,6 +8,7 @@
 
 mod analytic;
 mod bake;
+mod binary;
 mod build_tree;
 mod cylinder;
 mod disk;

@@ -180,6 +180,26 @@ fn building_twice_gives_the_same_tree() {
 }
 
 #[test]
+fn a_tree_that_only_halves_finds_the_same() {
+    let mut g = build(vec![soup(3000, 0.1, &mut random(12))]);
+    let mut r = random(13);
+    let rays: Vec<Ray> = (0..3000).map(|_| sample_ray(&mut r)).collect();
+    let before: Vec<_> = rays.iter().map(|ray| g.intersect(ray)).collect();
+    let corners = |i: usize| g.prims[i].v.map(|v| g.vertices[v as usize].p);
+    let items: Vec<Item> = (0..3000).map(|i| Item::Triangle(i as u32, corners(i))).collect();
+    let boxes: Vec<Aabb> = (0..3000).map(|i| Aabb::around(corners(i))).collect();
+    let mut growing = Growing::default();
+    g.tree.root = growing.collapse(&items, &super::binary::halved(&boxes));
+    assert!(growing.need(g.tree.root) < tree::STACK);
+    g.tree.nodes = Pages::new(&growing.nodes);
+    g.tree.blocks = Pages::new(&growing.blocks);
+    for (ray, hit) in rays.iter().zip(before) {
+        let t = |h: Option<Hit>| h.map(|h| h.t);
+        assert_eq!(t(g.intersect(ray)), t(hit));
+    }
+}
+
+#[test]
 fn odd_input_neither_panics_nor_hits() {
     let empty = build(vec![]);
     let ray = Ray { o: Vec3::ZERO, d: Vec3::Z, t_max: f32::INFINITY };
@@ -195,6 +215,13 @@ fn odd_input_neither_panics_nor_hits() {
         let points = (0..300).flat_map(|i| [Vec3::new(f(i), 0.0, 0.0), Vec3::new(f(i), 1.0, 0.0), Vec3::new(f(i), 0.0, 1.0)]);
         build(vec![mesh(points.collect(), (0..300).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())])
     };
+    // Nested and coinciding boxes by the thousand, over which some builders never end.
+    let nested = |grow: f32| {
+        let points = (0..20_000).flat_map(|i| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * (1.0 + grow * i as f32)));
+        let g = build(vec![mesh(points.collect(), (0..20_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())]);
+        g.intersect(&Ray { o: Vec3::new(0.2, 0.2, -1.0), d: Vec3::Z, t_max: 2.0 })
+    };
+    assert!(nested(0.0).is_some() && nested(1e-3).is_some());
     for g in [line(&|_| 1.0), line(&|i| i as f32), line(&|i| 1.2f32.powi(i)), line(&|i| 0.8f32.powi(i))] {
         let ray = Ray { o: Vec3::new(-1.0, 0.2, 0.2), d: Vec3::X, t_max: f32::INFINITY };
         assert!(g.intersect(&ray).is_some() && g.occluded(&ray));

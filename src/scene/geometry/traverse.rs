@@ -23,6 +23,9 @@ const MISS: Hit = Hit { t: 0.0, u: 0.0, v: 0.0, prim: NONE, instance: NONE };
 /// change is far below rounding.
 const FLAT: f32 = 1e-9;
 
+/// The two axes that follow each, in turn.
+static OTHER_AXES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
 /// A ray in the form that boxes and triangles are tested against.
 #[derive(Clone, Copy)]
 struct WideRay<L> {
@@ -63,7 +66,7 @@ impl<L: Lanes> WideRay<L> {
         } else {
             2
         };
-        let [x, y] = [[1, 2], [2, 0], [0, 1]][z];
+        let [x, y] = OTHER_AXES[z];
         let over_z = 1.0 / d[z];
         Some(Self {
             reciprocal: inverse.map(L::splat),
