@@ -156,7 +156,10 @@ fn text(s: &str) -> Text {
     Text::from_bytes_unchecked(SmallVec::from_slice(s.as_bytes()))
 }
 
-/// Writes all channels as f32 (lossless, deflated blocks of 16 rows) and all attributes as text.
+/// Writes all channels as f32 and all attributes as text. Run-length encoding is lossless, takes a
+/// hundredth of the time of deflate (0.17 s against 18 s for six noisy planes of 1920 × 1080 on
+/// a busy machine of two cores) and gives up 6 % of the size: noise does not deflate, and what is
+/// constant runs. An image is written every few seconds while it renders, so time counts.
 /// The attributes stand in the order of their names, so that equal images are equal files.
 pub(super) fn write(mut out: impl Write, file: &ImageFile) -> Result<(), Fault> {
     let size = (file.width as usize, file.height as usize);
@@ -178,11 +181,8 @@ pub(super) fn write(mut out: impl Write, file: &ImageFile) -> Result<(), Fault> 
             _ => drop(attributes.other.insert(text(name), AttributeValue::Text(text(value)))),
         }
     }
-    let encoding = Encoding {
-        compression: Compression::ZIP16,
-        blocks: ::exr::prelude::Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-    };
+    let encoding =
+        Encoding { compression: Compression::RLE, blocks: ::exr::prelude::Blocks::ScanLines, line_order: LineOrder::Increasing };
     let image = ::exr::prelude::Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(list)));
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|e| Fault::new(one_line(&e.to_string())))?;

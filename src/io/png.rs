@@ -8,7 +8,7 @@ use super::exr::ImageFile;
 use super::fault::{Fault, io_fault};
 use super::image::{linear_to_srgb, one_line};
 use ::image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use ::image::{ExtendedColorType, ImageEncoder, ImageError};
+use ::image::{ExtendedColorType, ImageEncoder};
 use std::io::Write;
 
 /// How linear radiance becomes the numbers of a PNG.
@@ -34,7 +34,7 @@ pub fn quantize(linear: f32, max: f32) -> f32 {
 }
 
 /// Writes the beauty layer.
-pub(super) fn write(out: impl Write, file: &ImageFile, options: PngOptions) -> Result<(), Fault> {
+pub(super) fn write(mut out: impl Write, file: &ImageFile, options: PngOptions) -> Result<(), Fault> {
     let pixels = file.rgb("").ok_or_else(|| Fault::new("the image has no channels R, G, B to write as PNG"))?;
     if pixels.len() != file.width as usize * file.height as usize {
         return Err(Fault::new(format!("the channels do not have {} × {} samples", file.width, file.height)));
@@ -47,9 +47,8 @@ pub(super) fn write(out: impl Write, file: &ImageFile, options: PngOptions) -> R
     } else {
         (values.map(|x| quantize(x, 255.0) as u8).collect(), ExtendedColorType::Rgb8)
     };
-    let encoder = PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive);
-    encoder.write_image(&bytes, file.width, file.height, kind).map_err(|e| match e {
-        ImageError::IoError(io) => io_fault(io),
-        other => Fault::new(one_line(&other.to_string())),
-    })
+    let mut encoded = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut encoded, CompressionType::Default, FilterType::Adaptive);
+    encoder.write_image(&bytes, file.width, file.height, kind).map_err(|e| Fault::new(one_line(&e.to_string())))?;
+    out.write_all(&encoded).map_err(io_fault)
 }

@@ -78,8 +78,8 @@ pub fn write_atomic(path: &Path, fill: impl FnOnce(&mut BufWriter<&File>) -> Res
         Ok(())
     };
     attempt().map_err(|f: Fault| {
-        let fault = Fault { what: format!("cannot write {}: {}", quote(path), f.what), hint: f.hint };
-        if fault.hint.is_none() && path.exists() { fault.hint("the file there was left as it was") } else { fault }
+        let kept = if path.exists() { "; the file there was left as it was" } else { "" };
+        Fault { what: format!("cannot write {}: {}{kept}", quote(path), f.what), hint: f.hint }
     })
 }
 
