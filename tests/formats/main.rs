@@ -8,6 +8,7 @@ mod images;
 mod mitsuba;
 mod mitsuba_errors;
 mod mitsuba_manual;
+mod mitsuba_suite;
 mod obj;
 mod peers;
 mod ply;

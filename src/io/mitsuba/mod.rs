@@ -4,9 +4,10 @@
 //! `io::assets` reads them. All problems are collected, each with file, line and column; whatever
 //! the input, nothing panics and nothing grows beyond fixed limits.
 //!
-//! `text` checks a text before it is parsed · `reader` makes the tree (`default`, `include`, `path`,
-//! `alias`) · `links` resolves references · `plugin` and the tables beside each `build` declare what
-//! is known · `builder` turns an element into typed values · `manual` writes docs/scene-format.md.
+//! `text` checks a text before it is parsed · `reader` makes the tree (`include`, `path`, `alias`) ·
+//! `parameters` are `default` and `$name` · `links` resolves references · `plugin` and the tables beside
+//! each `build` declare what is known · `builder` matches an element with its table · `properties` reads
+//! its values · `manual` writes docs/scene-format.md.
 
 mod bsdfs;
 mod builder;
@@ -16,7 +17,9 @@ mod integrators;
 mod links;
 mod manual;
 mod names;
+mod parameters;
 mod plugin;
+mod properties;
 mod reader;
 mod sensors;
 mod shapes;

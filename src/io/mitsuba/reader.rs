@@ -1,14 +1,15 @@
-//! XML text → [`Tree`]: `default`, `$name`, `include`, `path`, `alias` and ids, in document order.
+//! XML text → [`Tree`]: elements, `include`, `path`, `alias` and ids, in document order.
 //!
 //! Everything that could grow without bound on hostile input is counted: depth of nesting and of
-//! includes, number of included files, of elements, and the length of a replaced `$name`.
+//! includes, number of included files and of elements; `parameters` counts the length of replaced text.
 
 use super::files::Search;
 use super::names;
+use super::parameters::Parameters;
 use super::text::{self, Locator, MAX_DEPTH};
 use super::tree::{Attribute, DIRECTIVES, ELEMENTS, Node, NodeIndex, Tag, Tree};
 use crate::describe::{Place, Problems, SourceFile};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -16,9 +17,6 @@ use std::sync::Arc;
 const MAX_INCLUDE_DEPTH: usize = 32;
 const MAX_INCLUDES: usize = 10_000;
 const MAX_NODES: usize = 1 << 24;
-/// Longest value after replacement, and all replaced values of a scene together, in bytes.
-const MAX_VALUE: usize = 1 << 20;
-const MAX_REPLACED: usize = 1 << 28;
 
 /// Reads a scene file and all that it includes.
 pub struct Reader<'a> {
@@ -28,22 +26,11 @@ pub struct Reader<'a> {
     pub problems: &'a mut Problems,
     /// Where named files are looked for.
     pub search: Search,
-    parameters: BTreeMap<String, Parameter>,
+    parameters: Parameters,
     /// Files that are being read now, outermost first.
     open: Vec<PathBuf>,
     loaded: HashMap<PathBuf, (Arc<str>, Rc<Locator>)>,
-    later_defaults: HashSet<String>,
     includes: usize,
-    replaced: usize,
-}
-
-/// A parameter that `$name` stands for.
-struct Parameter {
-    value: String,
-    /// Given on the command line: stronger than any `<default>`.
-    given: bool,
-    /// Named by a `<default>` or replaced somewhere.
-    used: bool,
 }
 
 /// Where an element stands: its text, and whether it is inside an emitter.
@@ -57,20 +44,14 @@ struct Context<'t> {
 impl<'a> Reader<'a> {
     /// A reader with parameters given from outside.
     pub fn new(defines: &[(String, String)], search: Search, problems: &'a mut Problems) -> Self {
-        let parameters = defines
-            .iter()
-            .map(|(name, value)| (name.clone(), Parameter { value: value.clone(), given: true, used: false }))
-            .collect();
         Self {
             tree: Tree::default(),
             problems,
             search,
-            parameters,
+            parameters: Parameters::new(defines),
             open: Vec::new(),
             loaded: HashMap::new(),
-            later_defaults: HashSet::new(),
             includes: 0,
-            replaced: 0,
         }
     }
 
@@ -93,7 +74,7 @@ impl<'a> Reader<'a> {
         self.search.add(directory.clone());
         let (text, locator) = self.register(path, directory, text);
         self.tree.top = self.read_text(&text, &locator, 0, false, true);
-        self.report_unused_defines();
+        self.parameters.report_unused(self.problems);
     }
 
     /// Makes a text known to places.
@@ -119,7 +100,7 @@ impl<'a> Reader<'a> {
             }
         };
         for node in document.descendants().filter(|n| n.is_element() && n.tag_name().name() == "default") {
-            self.later_defaults.extend(node.attribute("name").map(str::to_string));
+            self.parameters.announce(node.attribute("name").unwrap_or(""));
         }
         let root = document.root_element();
         let context = Context { text, locator, depth, emissive };
@@ -246,7 +227,7 @@ impl<'a> Reader<'a> {
                 continue;
             };
             let place = context.locator.place(context.text, attribute.range_value().start);
-            attributes.push(Attribute { name, value: self.substitute(attribute.value(), place), place });
+            attributes.push(Attribute { name, value: self.parameters.replace(attribute.value(), place, self.problems), place });
         }
         attributes
     }
@@ -318,7 +299,7 @@ impl<'a> Reader<'a> {
             }
         }
         match (name, &values[..]) {
-            ("default", [name, value]) => self.set_default(name, value),
+            ("default", [name, value]) => self.parameters.set_default(name, value, self.problems),
             ("path", [value]) => self.add_path(value),
             ("alias", [id, new]) => match self.tree.ids.get(&id.value) {
                 Some(&index) => self.name(new.value.clone(), index, new.place),
@@ -331,17 +312,6 @@ impl<'a> Reader<'a> {
             },
             _ => {}
         }
-    }
-
-    fn set_default(&mut self, name: &Attribute, value: &Attribute) {
-        if !is_parameter_name(&name.value) {
-            self.problems
-                .error(name.place, format!("`{}` is not a parameter name", name.value))
-                .hint("letters, digits and _ only");
-            return;
-        }
-        let parameter = Parameter { value: value.value.clone(), given: false, used: true };
-        self.parameters.entry(name.value.clone()).or_insert(parameter).used = true;
     }
 
     fn add_path(&mut self, value: &Attribute) {
@@ -405,71 +375,6 @@ impl<'a> Reader<'a> {
             }
         }
     }
-
-    /// Replaces every `$name`: the longest known name that follows the sign.
-    fn substitute(&mut self, value: &str, place: Place) -> String {
-        if !value.contains('$') {
-            return value.to_string();
-        }
-        let mut out = String::new();
-        let mut rest = value;
-        while let Some(at) = rest.find('$') {
-            out.push_str(&rest[..at]);
-            rest = &rest[at + 1..];
-            let word = rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_').len();
-            let known = (1..=word).rev().find(|&n| self.parameters.get(&rest[..n]).is_some_and(|p| p.given || p.used));
-            match known {
-                Some(n) => {
-                    let parameter = self.parameters.get_mut(&rest[..n]).expect("just found");
-                    parameter.used = true;
-                    out.push_str(&parameter.value);
-                    rest = &rest[n..];
-                }
-                None => {
-                    self.report_undefined(&rest[..word], place);
-                    rest = &rest[word..];
-                }
-            }
-            if out.len() > MAX_VALUE {
-                self.problems.error(place, "the value is longer than 1 MiB once its parameters are replaced");
-                return String::new();
-            }
-        }
-        out.push_str(rest);
-        let before = self.replaced;
-        self.replaced += out.len();
-        if self.replaced > MAX_REPLACED {
-            if before <= MAX_REPLACED {
-                self.problems.error(place, "the parameters of this scene expand to more than 256 MiB of text");
-            }
-            return String::new();
-        }
-        out
-    }
-
-    fn report_undefined(&mut self, name: &str, place: Place) {
-        let hint = if self.later_defaults.contains(name) {
-            format!("its <default> stands after this line: move it up, or give it from outside (-D {name}=…)")
-        } else {
-            let known = self.parameters.keys().map(String::as_str);
-            format!("add <default name=\"{name}\" value=\"…\"/> or -D {name}=…; {}", names::hint(name, known))
-        };
-        self.problems.error(place, format!("the parameter `${name}` has no value")).hint(hint);
-    }
-
-    fn report_unused_defines(&mut self) {
-        let unused: Vec<String> =
-            self.parameters.iter().filter(|(_, p)| p.given && !p.used).map(|(name, _)| name.clone()).collect();
-        for name in unused {
-            let known = self.parameters.iter().filter(|(_, p)| p.used).map(|(name, _)| name.as_str());
-            let hint = names::hint(&name, known);
-            self.problems.error(Place::default(), format!("the scene has no parameter `{name}` (given from outside)")).hint(hint);
-        }
-    }
 }
 
 const VALUE_REQUIRED: &[&str] = &["name", "value"];
-
-fn is_parameter_name(name: &str) -> bool {
-    !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-}
