@@ -7,6 +7,7 @@ mod exr;
 mod images;
 mod mitsuba;
 mod mitsuba_errors;
+mod mitsuba_hostile;
 mod mitsuba_manual;
 mod mitsuba_suite;
 mod obj;

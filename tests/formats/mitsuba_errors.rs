@@ -1,7 +1,6 @@
 //! Bad scenes: each gets its message, with place and hint, and never a panic.
 
 use nephroid::io::mitsuba::{self, LoadError, LoadOptions};
-use proptest::prelude::*;
 use std::path::Path;
 
 const SENSOR: &str = r#"<sensor type="perspective"><float name="fov" value="40"/></sensor><emitter type="constant"/>"#;
@@ -342,19 +341,6 @@ fn includes_that_go_round_or_out_are_refused() {
 }
 
 #[test]
-fn references_cannot_unfold_without_bound() {
-    let doubling: String = (0..40)
-        .map(|i| {
-            let inner = ["color0", "color1"].map(|c| format!("<ref name=\"{c}\" id=\"t{i}\"/>")).concat();
-            format!("<texture type=\"checkerboard\" id=\"t{}\">{inner}</texture>", i + 1)
-        })
-        .collect();
-    expect(&format!("<texture type=\"checkerboard\" id=\"t0\"/>{doubling}"), &["references unfold"]);
-    let chain: String = (0..3000).map(|i| format!("<bsdf type=\"mask\" id=\"m{i}\"><ref id=\"m{}\"/></bsdf>", i + 1)).collect();
-    expect(&format!("{chain}<bsdf type=\"diffuse\" id=\"m3000\"/>"), &["references unfold"]);
-}
-
-#[test]
 fn all_problems_are_reported_at_once_in_order() {
     let text = fail(&(shape(r#"<float name="radus" value="1"/>"#) + &bsdf("difuse", "") + &shape(r#"<ref id="x"/>"#)));
     assert_eq!(text.matches("error:").count(), 3, "{text}");
@@ -364,67 +350,4 @@ fn all_problems_are_reported_at_once_in_order() {
 fn a_scene_without_a_sensor_is_an_error() {
     let text = fail_text("<scene version='3.0.0'/>", &LoadOptions::default()).to_string();
     assert!(text.contains("the scene has no sensor") && text.contains("no emitter: the image will be black"), "{text}");
-}
-
-const VALID: &str = r##"<scene version="3.0.0">
-    <default name="spp" value="64"/><path value="."/>
-    <integrator type="moment"><integrator type="path"><integer name="max_depth" value="12"/></integrator></integrator>
-    <sensor type="thinlens"><string name="fov_axis" value="x"/><float name="fov" value="42"/>
-        <float name="aperture_radius" value="0.1"/>
-        <transform name="to_world"><lookat origin="0.5, 3, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
-        <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
-        <film type="hdrfilm"><integer name="width" value="32"/><rfilter type="lanczos"/></film>
-    </sensor>
-    <texture type="checkerboard" id="t"><rgb name="color0" value="#ff8000"/></texture><alias id="t" as="u"/>
-    <bsdf type="twosided" id="b"><bsdf type="diffuse"><ref name="reflectance" id="u"/></bsdf></bsdf>
-    <bsdf type="roughconductor"><string name="material" value="Au"/><float name="alpha" value="0.2"/></bsdf>
-    <shape type="shapegroup" id="g"><shape type="sphere"><point name="center" x="1" y="2" z="3"/><ref id="b"/></shape></shape>
-    <shape type="instance"><ref id="g"/><transform name="to_world"><rotate y="1" angle="45"/><scale value="1.5"/>
-        <matrix value="1 0 0 0 1 0 0 0 1"/></transform></shape>
-    <shape type="disk"><emitter type="area"><spectrum name="radiance" value="400:0, 500:8, 600:15.6"/></emitter></shape>
-</scene>"##;
-
-/// One change of a text: remove, insert, repeat or replace.
-fn mutate(text: &mut String, change: (u8, u16, u16, u8)) {
-    let chars: Vec<char> = text.chars().collect();
-    let place = |v: u16| v as usize * chars.len() / 65536;
-    let (a, b) = (place(change.1).min(place(change.2)), place(change.1).max(place(change.2)));
-    let b = b.min(a + 60);
-    let pieces =
-        ["<", ">", "\"", "$", "/", "&", "é", "\0", "-", ":", "1e99", "<include filename=\"x\"/>", "<!--", "]]>", "<shape>"];
-    let piece: Vec<char> = pieces[change.3 as usize % pieces.len()].chars().collect();
-    let middle = match change.0 % 4 {
-        0 => Vec::new(),
-        1 => [&piece[..], &chars[a..b]].concat(),
-        2 => [&chars[a..b], &chars[a..b]].concat(),
-        _ => piece,
-    };
-    *text = chars[..a].iter().chain(&middle).chain(&chars[b..]).collect();
-}
-
-#[test]
-fn the_valid_scene_is_valid() {
-    let loaded = mitsuba::from_str(VALID, Path::new("."), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-    assert!(loaded.warnings.list.is_empty());
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn no_text_makes_the_reader_panic(changes in prop::collection::vec(any::<(u8, u16, u16, u8)>(), 1..6)) {
-        let mut text = VALID.to_string();
-        for change in changes {
-            mutate(&mut text, change);
-        }
-        if let Err(error) = mitsuba::from_str(&text, Path::new("/nonexistent"), &LoadOptions::default()) {
-            prop_assert!(error.problems.has_errors());
-            prop_assert!(!error.to_string().is_empty());
-        }
-    }
-
-    #[test]
-    fn no_bytes_make_the_reader_panic(text in "[<>/\"'=a-c $:&!\\-\\[\\]?\n0-9]{0,200}") {
-        let _ = mitsuba::from_str(&text, Path::new("/nonexistent"), &LoadOptions::default());
-    }
 }

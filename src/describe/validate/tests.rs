@@ -90,7 +90,7 @@ fn local_models_end_somewhere() {
     assert!(problems.list[0].what.contains("nested deeper than 32"));
     assert_eq!(problems.list.len(), Problems::MAX_LISTED);
     assert!(problems.unlisted > 90_000);
-    assert!(problems.render(&Sources::default()).ends_with(&format!("and {} more problems\n", problems.unlisted)));
+    assert!(problems.render(&Sources::default()).contains(&format!("and {} more problems", problems.unlisted)));
 }
 
 #[test]

@@ -105,6 +105,9 @@ impl<'a> Builder<'a> {
 
     /// Matches an object with its plugin's table; `None` if there is no such plugin (reported).
     pub fn given(&mut self, index: NodeIndex) -> Option<Given> {
+        if self.problems.is_flooded() {
+            return None;
+        }
         let node = self.node(index);
         let name = node.attribute("type")?.value.as_str();
         let Some(plugin) = plugin::find(node.tag, name) else {

@@ -1,7 +1,11 @@
 //! From a name in a scene file to a file: search directories, sandbox, and what was meant if nothing is found.
 
 use super::names;
+use super::values::shown;
 use std::path::{Path, PathBuf};
+
+/// Most directories that a scene may name.
+pub const MAX_DIRECTORIES: usize = 256;
 
 /// Directories in which named files are looked for.
 #[derive(Clone, Debug, Default)]
@@ -16,11 +20,16 @@ pub struct Search {
 pub type NotFound = (String, Option<String>);
 
 impl Search {
-    /// Adds a directory unless it is there already.
-    pub fn add(&mut self, directory: PathBuf) {
-        if !self.directories.contains(&directory) {
+    /// Adds a directory unless it is there already; `false` if there are too many.
+    pub fn add(&mut self, directory: PathBuf) -> bool {
+        if self.directories.contains(&directory) {
+            return true;
+        }
+        let fits = self.directories.len() < MAX_DIRECTORIES;
+        if fits {
             self.directories.push(directory);
         }
+        fits
     }
 
     /// The existing regular file that `name` means in a file standing in `beside`.
@@ -37,20 +46,20 @@ impl Search {
             let candidate = directory.join(name);
             let Ok(metadata) = std::fs::metadata(&candidate) else { continue };
             if !self.allows(&candidate) {
-                forbidden = Some(format!("file `{name}` lies outside of the sandbox directory"));
+                forbidden = Some(format!("file `{}` lies outside of the sandbox directory", shown(name)));
                 continue;
             }
             if metadata.is_dir() {
-                return Err((format!("`{name}` is a directory, not a file"), None));
+                return Err((format!("`{}` is a directory, not a file", shown(name)), None));
             }
             if !metadata.is_file() {
-                return Err((format!("`{name}` is not a regular file"), None));
+                return Err((format!("`{}` is not a regular file", shown(name)), None));
             }
             return Ok(candidate);
         }
         match forbidden {
             Some(what) => Err((what, self.sandbox.as_ref().map(|s| format!("allowed is what lies in {}", s.display())))),
-            None => Err((format!("file `{name}` not found"), Some(self.hint(name, &directories)))),
+            None => Err((format!("file `{}` not found", shown(name)), Some(self.hint(name, &directories)))),
         }
     }
 

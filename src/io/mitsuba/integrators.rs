@@ -13,8 +13,9 @@ const DEPTH: &[Property] = &[
     optional("rr_depth", Kind::Integer(1, u32::MAX as i64), "5", "Path length from which Russian roulette may end a path"),
 ];
 const HIDE: Property = optional("hide_emitters", Kind::Boolean, "false", "Leave out emitters that the sensor sees directly");
+const HIDDEN: &[Property] = &[HIDE];
+const WRAPPED: &[Property] = &[harmless("hide_emitters", Kind::Boolean, "The nested integrator decides")];
 const SHARED: &[Property] = &[
-    HIDE,
     harmless("samples_per_pass", Kind::Integer(0, i64::MAX), "Passes are chosen by the renderer"),
     harmless("block_size", Kind::Integer(0, i64::MAX), "Blocks are chosen by the renderer"),
     harmless("timeout", Kind::Float, "The budget is given on the command line"),
@@ -26,7 +27,7 @@ macro_rules! integrator {
             tag: Tag::Integrator,
             name: $name,
             doc: $doc,
-            properties: &[DEPTH, SHARED],
+            properties: &[DEPTH, HIDDEN, SHARED],
             example: concat!("<integrator type=\"", $name, "\">\n    <integer name=\"max_depth\" value=\"12\"/>\n</integrator>"),
         }
     };
@@ -40,7 +41,7 @@ pub const INTEGRATORS: &[Plugin] = &[
         tag: Tag::Integrator,
         name: "volpathmis",
         doc: "As `path`.",
-        properties: &[DEPTH, SHARED, &[harmless("use_spectral_mis", Kind::Boolean, "Media only")]],
+        properties: &[DEPTH, HIDDEN, SHARED, &[harmless("use_spectral_mis", Kind::Boolean, "Media only")]],
         example: r#"<integrator type="volpathmis"/>"#,
     },
     integrator!("ptracer", "Shooting walks: light tracing."),
@@ -50,6 +51,7 @@ pub const INTEGRATORS: &[Plugin] = &[
         name: "direct",
         doc: "Gathering walks of at most two edges: emitters, and surfaces that they light directly.",
         properties: &[
+            HIDDEN,
             SHARED,
             &[
                 harmless("shading_samples", Kind::Integer(0, i64::MAX), "The techniques are weighted by the renderer"),
@@ -65,7 +67,11 @@ pub const INTEGRATORS: &[Plugin] = &[
         tag: Tag::Integrator,
         name: "moment",
         doc: "Its nested integrator; variance is always recorded.",
-        properties: &[&[required("integrator", Kind::Objects(Tag::Integrator, 1), "The integrator that is used")], SHARED],
+        properties: &[
+            &[required("integrator", Kind::Objects(Tag::Integrator, 1), "The integrator that is used")],
+            WRAPPED,
+            SHARED,
+        ],
         example: r#"<integrator type="moment">
     <integrator type="path"/>
 </integrator>"#,
@@ -79,6 +85,7 @@ pub const INTEGRATORS: &[Plugin] = &[
                 differs("aovs", Kind::Text(&[]), "only the colour channels are written"),
                 required("integrator", Kind::Objects(Tag::Integrator, 1), "The integrator that is used"),
             ],
+            WRAPPED,
             SHARED,
         ],
         example: r#"<integrator type="aov">

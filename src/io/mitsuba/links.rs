@@ -5,6 +5,7 @@
 
 use super::names;
 use super::tree::{NodeIndex, Tag, Tree};
+use super::values::shown;
 use crate::describe::{Place, Problems};
 
 /// Longest chain of nested objects, references followed.
@@ -15,7 +16,7 @@ const MAX_UNFOLDED: u64 = 4096;
 /// Resolves every `ref` and cuts those that would make a cycle.
 pub fn resolve(tree: &mut Tree, problems: &mut Problems) {
     for index in 0..tree.nodes.len() {
-        if tree.nodes[index].tag != Tag::Ref {
+        if tree.nodes[index].tag != Tag::Ref || problems.is_flooded() {
             continue;
         }
         let Some(id) = tree.nodes[index].attribute("id") else { continue };
@@ -23,7 +24,7 @@ pub fn resolve(tree: &mut Tree, problems: &mut Problems) {
             Some(&target) => tree.nodes[index].target = Some(target),
             None => {
                 let hint = names::hint(&id.value, tree.ids.keys().map(String::as_str));
-                problems.error(id.place, format!("nothing has the id `{}`", id.value)).hint(hint);
+                problems.error(id.place, format!("nothing has the id `{}`", shown(&id.value))).hint(hint);
             }
         }
     }
@@ -109,13 +110,18 @@ impl<'a> Walk<'a> {
     /// `a -> b -> a`, each by its id or else its element.
     fn report_cycle(&mut self, reference: NodeIndex, target: NodeIndex) {
         let start = self.stack.iter().position(|&(n, _)| n == target).unwrap_or(0);
-        let cycle: Vec<String> = self.stack[start..].iter().map(|&(n, _)| n).chain([target]).map(|n| self.label(n)).collect();
+        let round = &self.stack[start..];
+        let mut cycle: Vec<String> = round.iter().take(20).map(|&(n, _)| self.label(n)).collect();
+        if round.len() > 20 {
+            cycle.push("…".into());
+        }
+        cycle.push(self.label(target));
         let place: Place = self.tree.nodes[reference].place_of("id");
         self.problems.error(place, format!("cyclic reference: {}", cycle.join(" -> ")));
     }
 
     fn label(&self, index: NodeIndex) -> String {
         let node = &self.tree.nodes[index];
-        node.text("id").map_or_else(|| format!("<{}>", node.tag.name()), str::to_string)
+        node.text("id").map_or_else(|| format!("<{}>", node.tag.name()), shown)
     }
 }

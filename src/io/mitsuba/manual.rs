@@ -198,5 +198,5 @@ Numbers in lists are separated by commas or blanks. Numbers must be finite.
 | `<spectrum filename="….spd"/>` | the same from a file with `wavelength value` on each line |
 
 Wavelengths are integrated with the CIE 1931 observer from 360 to 830 nm, under D65 except in an emitter;
-negative lanes become 0. Reflectances must lie in [0, 1]; radiance and the like must be finite and not negative.
+negative lanes become 0, and those of a list within [0, 1] at most 1. Reflectances must lie in [0, 1]; radiance and the like must be finite and not negative.
 "#;

@@ -1,7 +1,11 @@
 //! The nearest known name: what a person meant who wrote another.
 
+use super::values::shown;
+
 /// Most names that a hint lists.
 const MAX_LISTED: usize = 80;
+/// Most names that are compared.
+const MAX_COMPARED: usize = 10_000;
 
 /// The known name nearest to `name`, if any is near enough to be worth a question.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -9,7 +13,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     let limit = (name.chars().count() / 3).max(1) + 1;
     known
         .into_iter()
-        .filter(|k| !k.is_empty())
+        .take(MAX_COMPARED)
+        .filter(|k| !k.is_empty() && k.len() < 256)
         .map(|k| (strsim::damerau_levenshtein(&folded, &fold(k)), k))
         .filter(|&(distance, k)| distance <= limit && distance < k.chars().count())
         .min_by_key(|&(distance, _)| distance)
@@ -18,8 +23,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 
 /// `did you mean `x`? Known: a, b, c` from the names that would have been right.
 pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str> + Clone) -> String {
-    let near = nearest(name, known.clone()).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
-    let listed: Vec<&str> = known.clone().into_iter().take(MAX_LISTED).collect();
+    let near = nearest(name, known.clone()).map(|n| format!("did you mean `{}`? ", shown(n))).unwrap_or_default();
+    let listed: Vec<String> = known.clone().into_iter().take(MAX_LISTED).map(shown).collect();
     let more = if known.into_iter().nth(MAX_LISTED).is_some() { ", …" } else { "" };
     if listed.is_empty() { format!("{near}none is known here") } else { format!("{near}known: {}{more}", listed.join(", ")) }
 }

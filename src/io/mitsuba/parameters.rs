@@ -2,6 +2,7 @@
 
 use super::names;
 use super::tree::Attribute;
+use super::values::shown;
 use crate::describe::{Place, Problems};
 use std::collections::{BTreeMap, HashSet};
 
@@ -43,7 +44,7 @@ impl Parameters {
     pub fn set_default(&mut self, name: &Attribute, value: &Attribute, problems: &mut Problems) {
         let valid = !name.value.is_empty() && name.value.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         if !valid {
-            let what = format!("`{}` is not a parameter name", super::values::shown(&name.value));
+            let what = format!("`{}` is not a parameter name", shown(&name.value));
             problems.error(name.place, what).hint("letters, digits and _ only");
             return;
         }
@@ -93,6 +94,10 @@ impl Parameters {
     }
 
     fn report_undefined(&self, name: &str, place: Place, problems: &mut Problems) {
+        if problems.is_flooded() {
+            return;
+        }
+        let name = &shown(name);
         let hint = if self.announced.contains(name) {
             format!("its <default> stands after this line: move it up, or give it from outside (-D {name}=…)")
         } else {

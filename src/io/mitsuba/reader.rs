@@ -3,11 +3,12 @@
 //! Everything that could grow without bound on hostile input is counted: depth of nesting and of
 //! includes, number of included files and of elements; `parameters` counts the length of replaced text.
 
-use super::files::Search;
+use super::files::{MAX_DIRECTORIES, Search};
 use super::names;
 use super::parameters::Parameters;
 use super::text::{self, Locator, MAX_DEPTH};
 use super::tree::{Attribute, DIRECTIVES, ELEMENTS, Node, NodeIndex, Tag, Tree};
+use super::values::shown;
 use crate::describe::{Place, Problems, SourceFile};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -110,9 +111,9 @@ impl<'a> Reader<'a> {
         }
         let place = locator.place(text, root.range().start);
         if main {
-            let name = root.tag_name().name().to_string();
+            let name = root.tag_name().name();
             self.problems
-                .error(place, format!("the root element is <{name}>, not <scene>"))
+                .error(place, format!("the root element is <{}>, not <scene>", shown(name)))
                 .hint("a scene starts with <scene version=\"3.0.0\">");
             return Vec::new();
         }
@@ -155,10 +156,12 @@ impl<'a> Reader<'a> {
                 } else {
                     "versions 2.x and 3.x are read"
                 };
-                self.problems.error(place, format!("scene version {version} is not known")).hint(hint);
+                self.problems.error(place, format!("scene version {} is not known", shown(version))).hint(hint);
             }
             _ => {
-                self.problems.error(place, format!("`{version}` is not a scene version")).hint("versions 2.x and 3.x are read");
+                self.problems
+                    .error(place, format!("`{}` is not a scene version", shown(version)))
+                    .hint("versions 2.x and 3.x are read");
             }
         }
     }
@@ -185,11 +188,14 @@ impl<'a> Reader<'a> {
     }
 
     fn read_element(&mut self, xml: roxmltree::Node, context: &Context) -> Option<NodeIndex> {
+        if self.problems.is_flooded() {
+            return None;
+        }
         let place = context.locator.place(context.text, xml.range().start);
         let name = xml.tag_name().name();
         let Some(kind) = ELEMENTS.iter().find(|e| e.name == name) else {
             let known = ELEMENTS.iter().map(|e| e.name).chain(DIRECTIVES.iter().map(|d| d.0));
-            self.problems.error(place, format!("unknown element <{name}>")).hint(names::hint(name, known));
+            self.problems.error(place, format!("unknown element <{}>", shown(name))).hint(names::hint(name, known));
             return None;
         };
         if self.tree.nodes.len() >= MAX_NODES || context.depth >= MAX_DEPTH {
@@ -222,7 +228,7 @@ impl<'a> Reader<'a> {
             let Some(name) = allowed.iter().find(|a| **a == attribute.name()) else {
                 let place = context.locator.place(context.text, attribute.range().start);
                 self.problems
-                    .error(place, format!("unknown attribute `{}` of <{element}>", attribute.name()))
+                    .error(place, format!("unknown attribute `{}` of <{element}>", shown(attribute.name())))
                     .hint(names::hint(attribute.name(), allowed.iter().copied()));
                 continue;
             };
@@ -262,7 +268,9 @@ impl<'a> Reader<'a> {
             Some(&first) => {
                 let at = self.tree.nodes[first].place_of("id");
                 let first = self.tree.sources.locate(at).unwrap_or_default();
-                self.problems.error(place, format!("the id `{id}` is used twice")).hint(format!("it was first used at {first}"));
+                self.problems
+                    .error(place, format!("the id `{}` is used twice", shown(&id)))
+                    .hint(format!("it was first used at {first}"));
             }
             None => {
                 self.tree.ids.insert(id, index);
@@ -306,7 +314,7 @@ impl<'a> Reader<'a> {
                 None => {
                     let known: Vec<String> = self.tree.ids.keys().cloned().collect();
                     self.problems
-                        .error(id.place, format!("no element before this alias has the id `{}`", id.value))
+                        .error(id.place, format!("no element before this alias has the id `{}`", shown(&id.value)))
                         .hint(names::hint(&id.value, known.iter().map(String::as_str)));
                 }
             },
@@ -317,9 +325,11 @@ impl<'a> Reader<'a> {
     fn add_path(&mut self, value: &Attribute) {
         let directory = self.tree.directory(value.place).join(&value.value);
         if directory.is_dir() {
-            self.search.add(directory);
+            if !self.search.add(directory) {
+                self.problems.error(value.place, format!("the scene names more than {MAX_DIRECTORIES} directories"));
+            }
         } else {
-            self.problems.warning(value.place, format!("`{}` is not a directory", directory.display()));
+            self.problems.warning(value.place, format!("`{}` is not a directory", shown(&directory.display().to_string())));
         }
     }
 

@@ -3,7 +3,7 @@
 use super::builder::{Builder, Given};
 use super::plugin::{Kind, Plugin, Property, free, harmless, optional, required};
 use super::tree::{NodeIndex, Tag};
-use super::{bsdfs, emitters};
+use super::{bsdfs, emitters, values};
 use crate::describe::*;
 use glam::Vec3;
 
@@ -208,7 +208,10 @@ fn model(b: &mut Builder, given: &Given) -> Option<ShapeModel> {
         "instance" => {
             let (node, place) = g.objects(Tag::Shape).next()?;
             if b.node(node).plugin() != "shapegroup" {
-                b.problems.error(place, format!("{} copies a `shapegroup`, not a `{}`", g.label(), b.node(node).plugin()));
+                b.problems.error(
+                    place,
+                    format!("{} copies a `shapegroup`, not a `{}`", g.label(), values::shown(b.node(node).plugin())),
+                );
                 return None;
             }
             ShapeModel::Instance { group: group(b, node) }

@@ -108,8 +108,13 @@ pub fn point(v: DVec3) -> Vec3 {
 
 /// A text short and safe enough for a message.
 pub fn shown(text: &str) -> String {
-    let mut out: String = text.trim().chars().take(60).flat_map(char::escape_debug).collect();
-    if text.trim().chars().count() > 60 {
+    const LONGEST: usize = 200;
+    let text = text.trim();
+    let mut out = String::new();
+    for c in text.chars().take(LONGEST) {
+        if c.is_control() { out.extend(c.escape_default()) } else { out.push(c) }
+    }
+    if text.chars().nth(LONGEST).is_some() {
         out.push('…');
     }
     out
