@@ -4,7 +4,7 @@
 //! outside; reflectances, indices and the like are seen under D65, emission is not; negative lanes
 //! become 0, and those of a list within [0, 1] at most 1. The integral is exact, where Mitsuba sums
 //! at 1000 wavelengths: bands of a few nanometres differ by up to a per cent or two. Curves: CIE 1931
-//! 2° observer and CIE D65 at 5 nm, linear in between.
+//! 2° observer and CIE D65 at 5 nm, linear in between [CIE 018].
 
 use super::names;
 use super::text;

@@ -57,7 +57,7 @@ pub fn rgb(text: &str) -> Result<[f32; 3], String> {
     triple(text).map(|v| v.as_vec3().to_array())
 }
 
-/// The transfer function of sRGB, code value → linear (IEC 61966-2-1).
+/// The transfer function of sRGB, code value → linear [IEC 61966-2-1].
 fn decode_srgb(v: f32) -> f32 {
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
