@@ -1,7 +1,9 @@
 //! A model is not finished without its formula's source, an example, and a line in the list of tests.
 
 use crate::models::all_models;
-use nephroid::local::MODEL_SOURCES;
+use nephroid::io::mitsuba::{self, LoadOptions};
+use nephroid::local::{MODEL_SOURCES, Materials};
+use std::path::Path;
 
 fn head(source: &str) -> String {
     source.lines().map_while(|l| l.strip_prefix("//!")).map(|l| format!("{}\n", l.strip_prefix(' ').unwrap_or(l))).collect()
@@ -36,5 +38,21 @@ fn every_model_is_in_the_list_of_tests() {
     for (name, _) in MODEL_SOURCES {
         let tested = cases.iter().any(|c| c.name == name || c.name.starts_with(&format!("{name}_")));
         assert!(tested, "{name} has no line in models.rs");
+    }
+}
+
+/// The examples are scenes: read and built without a single warning.
+#[test]
+fn every_example_is_read_and_built() {
+    for (name, source) in MODEL_SOURCES {
+        let head = head(source);
+        let example = head.split("```xml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+        let shape = format!("<shape type=\"sphere\">{example}</shape>");
+        let rest = "<sensor type=\"perspective\"><film type=\"hdrfilm\"/></sensor><emitter type=\"constant\"/>";
+        let text = format!("<scene version=\"3.0.0\"><integrator type=\"path\"/>{rest}{shape}</scene>");
+        let loaded = mitsuba::from_str(&text, Path::new("."), &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(loaded.warnings.list, vec![], "{name}");
+        let materials = Materials::build(&loaded.scene.bsdfs, &loaded.scene.images);
+        assert!(materials.is_ok_and(|m| m.len() > 1), "{name}");
     }
 }
