@@ -13,9 +13,25 @@
 //! - [`scene`]: the built, immutable scene: geometry, emitters `Lᵉ`, sensors `Wᵉ`.
 //! - [`transport`]: the walks and the measurement.
 //! - [`film`]: exact accumulation into images.
+//! - [`render`]: passes of walks into a film, under a budget.
 //! - [`io`]: one file per format.
 //! - [`report`]: comparison of images.
 //! - [`cli`]: the command line.
+//!
+//! ```no_run
+//! use nephroid::render::{Budget, Control, Estimator, Options, PixelMeasurement, Render};
+//!
+//! let scene = nephroid::load("scenes/cup/scene.xml".as_ref(), &Default::default())?.scene;
+//! let options = Options::for_scene(&scene, Estimator::Bidirectional);
+//! let mut render = Render::new(&scene, &options)?;
+//! render.run(&Budget::passes(64), |_| Control::Continue);
+//! let picture = render.picture(); // mean and variance of every pixel
+//!
+//! // One pixel as one number, by gathering, by shooting and by both, each with its standard error.
+//! let phi = PixelMeasurement::new(&scene, &options, (200, 120), 1000)?;
+//! println!("{:?} {:?} {:?}", phi.gather, phi.shoot, phi.bidirectional);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod cli;
 pub mod describe;
@@ -30,7 +46,9 @@ pub mod spectrum;
 pub mod texture;
 pub mod transport;
 
+/// Vectors and matrices of the interface.
 pub use glam;
+
 use std::path::Path;
 
 /// A scene ready to render, and what may not be as meant.

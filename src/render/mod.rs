@@ -8,12 +8,11 @@
 //!
 //! ```no_run
 //! use nephroid::render::{Budget, Control, Estimator, Options, Render};
-//! # fn scene() -> nephroid::scene::Scene { unimplemented!() }
-//! let scene = scene();
+//! let scene = nephroid::load("scenes/cup/scene.xml".as_ref(), &Default::default())?.scene;
 //! let mut render = Render::new(&scene, &Options::for_scene(&scene, Estimator::Bidirectional))?;
 //! render.run(&Budget::passes(64), |_| Control::Continue);
 //! let picture = render.picture();
-//! # Ok::<(), nephroid::render::RenderError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod estimator;
