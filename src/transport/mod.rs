@@ -14,7 +14,7 @@
 //! - [`walk`]: one step of either walker.
 //! - [`gather`], [`shoot`]: the two walks, alike on purpose.
 //! - [`cache`]: light vertices kept for connections.
-//! - [`reference`]: the same weights the slow way, for tests.
+//! - [`mod@reference`]: the same weights the slow way, for tests.
 
 pub mod cache;
 pub mod class;

@@ -1,9 +1,9 @@
 //! Geometry of the built scene: the ray casting function h(x, ω), visibility V(x ↔ y), surface
 //! points and points drawn on surfaces.
 //!
-//! All shapes of the scene are in one tree of boxes ([`tree`]); groups have trees of their own, of
-//! which instances are leaves. A ray meets triangles and analytic shapes ([`traverse`]); what it
-//! met becomes a [`Surface`] from the primitive itself, not from the rounded ray ([`surface`]).
+//! All shapes of the scene are in one tree of boxes (`tree`); groups have trees of their own, of
+//! which instances are leaves. A ray meets triangles and analytic shapes (`traverse`); what it
+//! met becomes a [`Surface`] from the primitive itself, not from the rounded ray (`surface`).
 //! Orientation, texture coordinates and tangents are Mitsuba 3's for each shape.
 
 mod analytic;
