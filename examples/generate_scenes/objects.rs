@@ -112,12 +112,12 @@ pub fn emerald() -> Mesh {
 /// A sheet of paper: a floor that bends up into a wall; x across, the wall at +y.
 pub fn backdrop() -> Mesh {
     let profile =
-        chain(&[line((-6.0, 0.0), (5.0, 0.0), 11), arc((5.0, 4.0), 4.0, -90.0, 0.0, 24), line((9.0, 4.0), (9.0, 12.0), 4)]);
+        chain(&[line((-6.0, 0.0), (5.0, 0.0), 11), arc((5.0, 4.0), 4.0, -90.0, 0.0, 24), line((9.0, 4.0), (9.0, 7.0), 2)]);
     let last = profile.len() - 1;
     Mesh::surface(1, last as u32, |u, v| {
         let i = (v * last as f64).round() as usize;
         let tangent = (profile[(i + 1).min(last)] - profile[i.saturating_sub(1)]).normalize();
-        (dvec3(24.0 * u - 12.0, profile[i].x, profile[i].y), dvec3(0.0, -tangent.y, tangent.x))
+        (dvec3(13.0 * u - 6.5, profile[i].x, profile[i].y), dvec3(0.0, -tangent.y, tangent.x))
     })
 }
 
