@@ -29,7 +29,8 @@ fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
 fn citations(text: &str) -> Vec<String> {
     let text = text.replace("\n//!", "").replace("\n///", "").replace("\n    ///", "");
     let inside = text.split('[').skip(1).filter_map(|rest| rest.split_once(']').map(|(key, _)| key));
-    let keys = inside.map(|key| key.split(',').next().unwrap_or(key).split_whitespace().collect::<Vec<_>>().join(" "));
+    let each = inside.flat_map(|keys| keys.split(';'));
+    let keys = each.map(|key| key.split(',').next().unwrap_or(key).split_whitespace().collect::<Vec<_>>().join(" "));
     let is_key = |key: &String| {
         let Some((author, year)) = key.rsplit_once(' ') else { return false };
         let digits = year.trim_end_matches(|c: char| c.is_ascii_lowercase());
