@@ -35,7 +35,7 @@ fn citations(text: &str) -> Vec<String> {
         let Some((author, year)) = key.rsplit_once(' ') else { return false };
         let digits = year.trim_end_matches(|c: char| c.is_ascii_lowercase());
         let is_year = digits.len() == 4 && matches!(digits.parse(), Ok(1600..=2100));
-        is_year && author.starts_with(char::is_alphabetic) && author.len() < 40
+        is_year && author.starts_with(char::is_alphabetic) && author.chars().all(|c| c.is_alphabetic() || " .&-’'".contains(c))
     };
     keys.filter(is_key).collect()
 }
