@@ -9,6 +9,7 @@ use super::disk::Disk;
 use super::ray::{Aabb, Ray};
 use super::sphere::Sphere;
 use super::surface::Local;
+use crate::math::warp::ONE_MINUS_EPSILON;
 use glam::{DVec3, Vec2, Vec3};
 
 /// One of the analytic shapes.
@@ -87,9 +88,46 @@ pub(super) fn roots(dd: f64, qd: f64, miss2: f64, r: f64) -> Option<(f64, f64)> 
     Some((middle - half, middle + half))
 }
 
-/// Angle in turns, [0, 1).
+/// Angle of (x, y) in turns, [0, 1).
 #[inline]
 pub(super) fn turns(y: f64, x: f64) -> f32 {
-    let phi = (y as f32).atan2(x as f32) * (0.5 * std::f32::consts::FRAC_1_PI);
-    if phi < 0.0 { phi + 1.0 } else { phi }
+    let turn = angle(y.abs() as f32, x as f32) * (0.5 * std::f32::consts::FRAC_1_PI);
+    if y < 0.0 { (1.0 - turn).min(ONE_MINUS_EPSILON) } else { turn }
+}
+
+/// Angle of (x, y), y ≥ 0, in [0, π], to 3e-7: arctangent's series economised on ±tan(π/8), after one
+/// division; several times faster than the general function, and a part of every hit of a sphere.
+#[inline]
+pub(super) fn angle(y: f32, x: f32) -> f32 {
+    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    let across = x.abs();
+    let (low, high) = (across.min(y), across.max(y));
+    if high <= 0.0 {
+        return 0.0;
+    }
+    let (numerator, denominator, start) =
+        if low > 0.414_213_57 * high { (low - high, low + high, FRAC_PI_4) } else { (low, high, 0.0) };
+    let t = numerator / denominator;
+    let z = t * t;
+    let series = ((8.053_744_6e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
+    let first = start + (series * z * t + t);
+    let quarter = if y > across { FRAC_PI_2 - first } else { first };
+    if x < 0.0 { PI - quarter } else { quarter }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn angles_are_those_of_atan2() {
+        for i in 0..100_000 {
+            let phi = f64::from(i) * 6.4e-5 - 0.05;
+            let (y, x) = (phi.sin() * 1.7, phi.cos() * 1.7);
+            let want = y.atan2(x);
+            assert!((f64::from(super::angle(y.abs() as f32, x as f32)) - want.abs()).abs() < 4e-7, "{phi}");
+            let turn = f64::from(super::turns(y, x)) * std::f64::consts::TAU;
+            let far = (turn - want).rem_euclid(std::f64::consts::TAU);
+            assert!(far.min(std::f64::consts::TAU - far) < 8e-7 && turn >= 0.0 && turn < std::f64::consts::TAU, "{phi}");
+        }
+        assert_eq!(super::turns(0.0, 0.0), 0.0);
+    }
 }

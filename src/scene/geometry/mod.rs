@@ -165,27 +165,28 @@ impl Geometry {
     /// The surface point that `ray` met at `hit`.
     #[inline]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        let prim = self.prims[hit.prim as usize];
+        let prim = &self.prims[hit.prim as usize];
         let shape = &self.shapes[prim.shape as usize];
-        let through = if hit.instance == NONE { None } else { Some(&self.tree.instances[hit.instance as usize]) };
-        let local = if prim.v[0] != NONE {
-            triangle::surface(&prim.v.map(|i| &self.vertices[i as usize]), shape, hit.u, hit.v)
+        if prim.v[0] != NONE && hit.instance == NONE {
+            triangle::surface(prim.v.map(|i| &self.vertices[i as usize]), shape, hit.u, hit.v).on(prim.shape, shape)
         } else {
-            let ray = through.map_or(*ray, |i| i.ray_to_group(ray, ray.t_max));
+            self.rare_surface(ray, hit)
+        }
+    }
+
+    /// The same for analytic shapes and for all that is seen through an instance.
+    #[inline(never)]
+    fn rare_surface(&self, ray: &Ray, hit: &Hit) -> Surface {
+        let prim = &self.prims[hit.prim as usize];
+        let shape = &self.shapes[prim.shape as usize];
+        let instance = if hit.instance == NONE { None } else { Some(&self.tree.instances[hit.instance as usize]) };
+        let local = if prim.v[0] != NONE {
+            triangle::surface(prim.v.map(|i| &self.vertices[i as usize]), shape, hit.u, hit.v)
+        } else {
+            let ray = instance.map_or(*ray, |i| i.ray_to_group(ray, ray.t_max));
             self.tree.analytic[prim.v[1] as usize].0.surface(&ray, hit.t, shape.needs_tangent)
         };
-        let local = through.map_or(local, |i| i.point_to_world(&local));
-        Surface {
-            p: local.p,
-            p_error: local.p_error,
-            n_g: local.n_g,
-            n_s: local.n_s,
-            dp_du: local.dp_du,
-            uv: local.uv,
-            shape: prim.shape,
-            material: shape.material,
-            emitter: shape.emitter,
-        }
+        instance.map_or(local, |i| i.point_to_world(&local)).on(prim.shape, shape)
     }
 
     /// Do `a` and `b` see each other? Both ends are moved off their surfaces towards each other and

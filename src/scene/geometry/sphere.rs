@@ -4,7 +4,7 @@
 //! from x [Shirley 1996], in the form that stays exact for a tiny far sphere [Pharr 2023, sec. 6.2.4]:
 //! everything follows from sin²θ_max = r²/|x − c|², never from 1 − cosθ_max by subtraction.
 
-use super::analytic::{first_root, roots, turns};
+use super::analytic::{angle, first_root, roots, turns};
 use super::surface::{Local, rounded_error};
 use crate::math::warp::sphere_uniform;
 use glam::{DMat3, DVec3, Vec2, Vec3};
@@ -127,5 +127,5 @@ fn one_minus_cos(sin2: f64) -> f64 {
 #[inline]
 fn uv(own: DVec3) -> Vec2 {
     let rho = own.truncate().length() as f32;
-    Vec2::new(turns(own.y, own.x), rho.atan2(own.z as f32) * std::f32::consts::FRAC_1_PI)
+    Vec2::new(turns(own.y, own.x), angle(rho, own.z as f32) * std::f32::consts::FRAC_1_PI)
 }

@@ -257,6 +257,21 @@ fn degenerate_triangles_are_left_out() {
 }
 
 #[test]
+fn areas_are_those_of_the_formulas() {
+    use std::f32::consts::PI;
+    let m = Mat4::from_rotation_x(0.7) * Mat4::from_scale(Vec3::new(2.0, 3.0, 0.5));
+    let similar = Mat4::from_rotation_y(0.3) * Mat4::from_scale(Vec3::splat(-1.5));
+    let sphere = Form::Sphere { center: Vec3::ONE, radius: 0.4 };
+    let cylinder = Form::Cylinder { p0: Vec3::ZERO, p1: Vec3::new(0.0, 3.0, 4.0), radius: 0.2 };
+    let shapes = [(Form::Rectangle, m), (Form::Disk, m), (Form::Cube, m), (sphere, similar), (cylinder, similar)];
+    let g = build(shapes.map(|(form, m)| ShapeInput::new(form).at(m)).to_vec());
+    let want = [24.0, 6.0 * PI, 8.0 * (6.0 + 1.5 + 1.0), 4.0 * PI * 0.36, 2.0 * PI * 0.3 * 7.5];
+    for (i, want) in want.into_iter().enumerate() {
+        assert!((g.area(i as u32) / want - 1.0).abs() < 1e-5, "shape {i}: {} {want}", g.area(i as u32));
+    }
+}
+
+#[test]
 fn sampled_points_lie_on_the_shape_and_are_uniform() {
     let mut r = random(21);
     let (shapes, _, _) = mixed(&mut r);

@@ -165,6 +165,30 @@ fn rays_inside_a_sphere_cross_it() {
 }
 
 #[test]
+fn tiny_far_spheres_are_round() {
+    let mut r = random(36);
+    for (center, radius) in [(Vec3::new(40.0, -30.0, 41.0), 0.6), (Vec3::new(0.0, 100.0, 0.0), 1e-3)] {
+        let g = build(vec![ShapeInput::new(Form::Sphere { center, radius })]);
+        for _ in 0..2000 {
+            let aim = center + vec3(&mut r) * radius;
+            let ray = Ray { o: Vec3::ZERO, d: aim, t_max: f32::INFINITY };
+            // |o + t·d − c| in double precision.
+            let (d, c) = (ray.d.as_dvec3(), center.as_dvec3());
+            let nearest = d * (c.dot(d) / d.length_squared()) - c;
+            let inside = f64::from(radius).powi(2) - nearest.length_squared();
+            let hit = g.intersect(&ray);
+            assert_eq!(hit.is_some(), inside >= 0.0);
+            assert_eq!(g.occluded(&ray), inside >= 0.0);
+            let Some(hit) = hit else { continue };
+            let out = (nearest - d.normalize() * inside.sqrt()).normalize();
+            let s = g.surface(&ray, &hit);
+            assert!((s.n_g.as_dvec3() - out).length() < 1e-6, "{s:?} {out}");
+            assert!((s.p.as_dvec3() - (c + out * f64::from(radius))).abs().max_element() <= f64::from(s.p_error));
+        }
+    }
+}
+
+#[test]
 fn surfaces_close_by_are_not_skipped() {
     let mut r = random(35);
     for (scale, shift) in [(1.0, 0.0), (1e-3, 0.0), (1e4, 0.0), (1.0, 10.0)] {

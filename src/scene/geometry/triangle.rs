@@ -6,8 +6,8 @@ use crate::math::Frame;
 use glam::{Vec2, Vec3};
 
 /// The point with barycentric coordinates (1 − u − v, u, v).
-#[inline]
-pub(super) fn surface([a, b, c]: &[&Vertex; 3], shape: &Shape, u: f32, v: f32) -> Local {
+#[inline(always)]
+pub(super) fn surface([a, b, c]: [&Vertex; 3], shape: &Shape, u: f32, v: f32) -> Local {
     let (e1, e2) = (b.p - a.p, c.p - a.p);
     let p = a.p + (e1 * u + e2 * v);
     let (face, double_area) = normal_of(e1, e2);
@@ -20,7 +20,7 @@ pub(super) fn surface([a, b, c]: &[&Vertex; 3], shape: &Shape, u: f32, v: f32) -
 
 /// Geometric and shading normal. Vertex normals decide the side (they are flipped already);
 /// without them the order of the vertices does.
-#[inline]
+#[inline(always)]
 pub(super) fn orient([a, b, c]: [&Vertex; 3], shape: &Shape, face: Vec3, [w, u, v]: [f32; 3]) -> (Vec3, Vec3) {
     if shape.has_normals {
         let n = a.n * w + b.n * u + c.n * v;
