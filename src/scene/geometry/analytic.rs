@@ -126,7 +126,8 @@ mod tests {
             assert!((f64::from(super::angle(y.abs() as f32, x as f32)) - want.abs()).abs() < 4e-7, "{phi}");
             let turn = f64::from(super::turns(y, x)) * std::f64::consts::TAU;
             let far = (turn - want).rem_euclid(std::f64::consts::TAU);
-            assert!(far.min(std::f64::consts::TAU - far) < 8e-7 && turn >= 0.0 && turn < std::f64::consts::TAU, "{phi}");
+            assert!(far.min(std::f64::consts::TAU - far) < 8e-7, "{phi}");
+            assert!((0.0..std::f64::consts::TAU).contains(&turn), "{phi}");
         }
         assert_eq!(super::turns(0.0, 0.0), 0.0);
     }
