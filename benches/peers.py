@@ -51,7 +51,7 @@ class Nephroid:
             command = [BINARY, "render", self.path, "-o", out, "--estimator", "gather", "--spp", str(spp), "--seed",
                        str(seed), "--threads", str(self.threads), "--quiet", "--stats", stats]
             subprocess.run(command, check=True)
-            image = np.array(mi.Bitmap(out).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+            image = np.array(dict(mi.Bitmap(out).split())["<root>"].convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
             return image, json.load(open(stats))["render_seconds"]
 
 

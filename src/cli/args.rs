@@ -169,6 +169,9 @@ pub struct TransportArgs {
     /// Connections from each gathering vertex.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub connections: u32,
+    /// Let light start as the lamps emit it, not where a pilot found that it matters
+    #[arg(long)]
+    pub no_guide: bool,
 }
 
 /// What to say about a scene.

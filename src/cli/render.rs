@@ -106,6 +106,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     s.max_length = t.max_length.unwrap_or(s.max_length);
     s.light_paths = t.light_paths;
     s.connections = t.connections;
+    s.guided = !t.no_guide;
     s.seed = args.seed.unwrap_or(opened.scene.seed);
     (estimator, options)
 }
@@ -261,6 +262,7 @@ impl Job<'_> {
             "min_length": set.min_length,
             "max_length": set.max_length,
             "connections": set.connections,
+            "guided": set.guided,
             "seed": set.seed,
             "width": film.width(),
             "height": film.height(),

@@ -2,6 +2,7 @@
 
 pub mod distribution;
 pub mod frame;
+pub mod quadtree;
 pub mod random;
 pub mod warp;
 

@@ -46,6 +46,53 @@ pub fn disk_concentric(u: Vec2) -> Vec2 {
     if flat { Vec2::new(along, aside) } else { Vec2::new(aside, along) }
 }
 
+/// Inverse of [`disk_concentric`], to about 1e-6.
+#[inline]
+pub fn disk_concentric_inverse(d: Vec2) -> Vec2 {
+    let flat = d.x.abs() > d.y.abs();
+    let (along, aside) = if flat { (d.x, d.y) } else { (d.y, d.x) };
+    let r = d.length().copysign(along);
+    let t = if along == 0.0 { 0.0 } else { aside / along };
+    let across = r * (atan_unit(t) * (4.0 * FRAC_1_PI));
+    let o = if flat { Vec2::new(r, across) } else { Vec2::new(across, r) };
+    (0.5 * (o + Vec2::ONE)).clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON))
+}
+
+/// Arctangent of |t| ≤ 1 to 3e-7: half of the angle by the tangent's half-angle formula, then a short
+/// series.
+#[inline]
+fn atan_unit(t: f32) -> f32 {
+    let half = t / (1.0 + (1.0 + t * t).sqrt());
+    let z = half * half;
+    let series = ((8.053_744_6e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
+    2.0 * (series * z * half + half)
+}
+
+/// Sphere from the square, area to area: z ≥ 0 over u.x < ½, z < 0 over the rest, each hemisphere a
+/// concentric disk under Lambert's azimuthal projection.
+#[inline]
+pub fn sphere_charts(u: Vec2) -> Vec3 {
+    let below = u.x >= 0.5;
+    let x = 2.0 * u.x - f32::from(u8::from(below));
+    let d = disk_concentric(Vec2::new(x, u.y));
+    let r2 = d.length_squared().min(1.0);
+    let z = 1.0 - r2;
+    (d * (2.0 - r2).sqrt()).extend(if below { -z } else { z })
+}
+
+/// Inverse of [`sphere_charts`] for a unit vector.
+#[inline]
+pub fn sphere_charts_inverse(w: Vec3) -> Vec2 {
+    let d = w.truncate() / (1.0 + w.z.abs()).sqrt();
+    let u = disk_concentric_inverse(d);
+    // The charts meet at x = ½: nothing of the first may be rounded into the second.
+    if w.z >= 0.0 {
+        Vec2::new((0.5 * u.x).min(0.5 - f32::EPSILON), u.y)
+    } else {
+        Vec2::new((0.5 + 0.5 * u.x).min(ONE_MINUS_EPSILON), u.y)
+    }
+}
+
 /// Cosine-weighted hemisphere around +z: `p_w = cosθ / π`.
 #[inline]
 pub fn hemisphere_cosine(u: Vec2) -> Vec3 {
@@ -118,5 +165,31 @@ mod tests {
         }
         let corner = disk_concentric(Vec2::new(1.0, 0.0));
         assert!((corner - Vec2::new(0.5f32.sqrt(), -(0.5f32.sqrt()))).length() < 1e-6, "{corner}");
+    }
+
+    #[test]
+    fn inverses_undo() {
+        for i in 0..20_000u32 {
+            let at = |m: u32| (i.wrapping_mul(m) >> 8) as f32 / 16_777_216.0;
+            let u = Vec2::new(at(2_654_435_769), at(3_812_015_801));
+            assert!((disk_concentric_inverse(disk_concentric(u)) - u).length() < 2e-6, "{u}");
+            let w = sphere_charts(u);
+            assert!((w.length() - 1.0).abs() < 1e-6, "{u}");
+            let back = sphere_charts_inverse(w);
+            // Near the rim of a chart the same direction lies in the other as well.
+            assert!((back - u).length() < 3e-6 || w.z.abs() < 1e-5, "{u} {back}");
+        }
+    }
+
+    #[test]
+    fn sphere_charts_keep_area() {
+        let (n, mut sums) = (400, [0.0f64; 3]);
+        for i in 0..n * n {
+            let w = sphere_charts((Vec2::new((i % n) as f32, (i / n) as f32) + 0.5) / n as f32);
+            for (sum, x) in sums.iter_mut().zip([w.x * w.x, w.y * w.y, w.z.powi(4)]) {
+                *sum += f64::from(x) / f64::from(n * n);
+            }
+        }
+        assert!((sums[0] - 1.0 / 3.0).abs() < 1e-4 && (sums[1] - 1.0 / 3.0).abs() < 1e-4 && (sums[2] - 0.2).abs() < 1e-4);
     }
 }

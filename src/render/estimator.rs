@@ -85,7 +85,7 @@ impl Options {
         let mut h = blake3::Hasher::new();
         h.update(&scene.hash());
         h.update(&[u8::from(t.hit), u8::from(t.next_event), u8::from(t.splat), u8::from(t.connect)]);
-        h.update(&[u8::from(s.heuristic == Heuristic::Power), u8::from(s.hide_emitters)]);
+        h.update(&[u8::from(s.heuristic == Heuristic::Power), u8::from(s.hide_emitters), u8::from(s.guided)]);
         for n in [s.min_length, s.max_length, s.rr_depth, s.connections] {
             h.update(&n.to_le_bytes());
         }

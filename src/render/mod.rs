@@ -164,8 +164,11 @@ impl<'a> Render<'a> {
             None => None,
         };
         let pixels = crop[2].saturating_mul(crop[3]);
-        let vertices = pilot::vertices_per_path(scene, &options.settings, pixels);
-        let plan = Plan::new(&options.settings, pixels, d.width.saturating_mul(d.height), vertices);
+        let decide = || pilot::decide(scene, &options.settings, crop);
+        let decisions = pool.as_ref().map_or_else(decide, |p| p.install(decide));
+        let vertices = decisions.vertices_per_path;
+        let film_pixels = d.width.saturating_mul(d.height);
+        let plan = Plan { guide: decisions.guide, ..Plan::new(&options.settings, pixels, film_pixels, vertices) };
         film.identity.decisions = vertices.to_bits().to_le_bytes().to_vec();
         film.identity.hash = options.identity(scene);
         Ok(Self { scene, plan, film, filter, crop, pool, statistics: Statistics::default() })

@@ -162,7 +162,7 @@ fn hit<R: Record, O: Observe>(
             0.0
         };
         let e = if plan.two_sided {
-            let e = scene.lights.density_emission(point, -d);
+            let e = scene.lights.density_emission(&scene.geometry, &plan.guide, point, -d, walk.from);
             e.p_k * e.p_next * walk.cos_from * arrival.inv_d2
         } else {
             0.0
@@ -188,6 +188,7 @@ fn hit<R: Record, O: Observe>(
         light_delta: false,
         light_vertex: 0,
         lens: Vec3::ZERO,
+        value,
     };
     finish(cx, path, value, join, 0, tally);
 }
@@ -209,7 +210,7 @@ fn next_event<R: Record, O: Observe>(
         return;
     }
     let x = &vertex.surface;
-    let Some(mut ne) = scene.lights.sample_next_event(&scene.geometry, x.p, u_pick, u) else { return };
+    let Some(mut ne) = scene.lights.sample_next_event(&scene.geometry, &plan.guide, x.p, u_pick, u) else { return };
     if planted(Mutant::NextEventDensity) {
         ne.nu *= 1.5;
     }
@@ -243,6 +244,7 @@ fn next_event<R: Record, O: Observe>(
         light_delta: ne.delta,
         light_vertex: 0,
         lens: Vec3::ZERO,
+        value,
     };
     finish(cx, path, value, join, 1, tally);
 }
@@ -315,6 +317,7 @@ fn connect<R: Record, O: Observe>(
             light_delta: y.light_delta,
             light_vertex: picked as usize,
             lens: Vec3::ZERO,
+            value,
         };
         finish(cx, path, value, join, y.length + 1, tally);
     }

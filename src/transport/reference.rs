@@ -13,7 +13,7 @@ use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
 use super::walk::{Join, Observe};
 use super::{Technique, cache::LightVertex};
-use crate::scene::emitter::EmitterPoint;
+use crate::scene::emitter::{Emission, EmitterPoint};
 use crate::scene::{Scene, Surface};
 use glam::Vec3;
 
@@ -113,7 +113,7 @@ impl Path {
             }
         }
         let last = self.vertices[m - 1].surface;
-        let e = scene.lights.density_emission(&self.light, -to_light);
+        let e = scene.lights.density_emission(&scene.geometry, &plan.guide, &self.light, -to_light, last.p);
         let infinite = scene.lights.is_infinite(self.light.emitter);
         let inv_d2 = if infinite { 1.0 } else { 1.0 / f64::from((self.light.y - last.p).length_squared()) };
         d.s[k] = f64::from(e.p_k);
@@ -305,10 +305,10 @@ impl Witness {
 }
 
 impl Observe for Witness {
-    fn started(&mut self, from: Vec3, light: Option<(&EmitterPoint, bool)>) {
+    fn started(&mut self, from: Vec3, light: Option<&Emission>) {
         self.vertices.clear();
         self.lens = from;
-        self.light = light.map(|(p, delta)| (*p, delta));
+        self.light = light.map(|e| (e.point, e.delta));
     }
 
     fn arrived(&mut self, surface: &Surface) {

@@ -3,6 +3,7 @@
 use super::class::PathFilter;
 use super::mis::Heuristic;
 use super::mutant::{Mutant, planted};
+use crate::scene::emitter::Guide;
 
 /// Joins that are allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +74,8 @@ pub struct Settings {
     pub light_paths: Option<u32>,
     /// Connections per gathering vertex.
     pub connections: u32,
+    /// Light paths start where a pilot found that they matter.
+    pub guided: bool,
     /// Classes of paths that count.
     pub paths: PathFilter,
     /// Seed of all random numbers.
@@ -90,6 +93,7 @@ impl Default for Settings {
             hide_emitters: false,
             light_paths: None,
             connections: 1,
+            guided: true,
             paths: PathFilter::default(),
             seed: 0,
         }
@@ -117,6 +121,8 @@ pub struct Plan {
     pub splat_direct: bool,
     /// Factor on splats from normalisation, 1/N.
     pub inv_light_paths: f32,
+    /// Learned densities of emission.
+    pub guide: Guide,
 }
 
 /// Longest path that is ever walked: roulette ends walks long before, except where it is off.
@@ -146,6 +152,7 @@ impl Plan {
             splat_emitters: t.splat && !t.hit,
             splat_direct: t.splat && !t.next_event,
             inv_light_paths: if light_paths > 0 { 1.0 / normaliser as f32 } else { 0.0 },
+            guide: Guide::default(),
             settings,
         }
     }

@@ -31,8 +31,8 @@ pub fn shoot<R: Record, O: Observe>(
         splat_emitter(cx, random, tally);
     }
     let (u_pick, u_position, u_direction) = (random.unit(), random.unit2(), random.unit2());
-    let Some(start) = scene.lights.sample_emission(&scene.geometry, u_pick, u_position, u_direction) else { return };
-    tally.observe.started(start.point.y, Some((&start.point, start.delta)));
+    let Some(start) = scene.lights.sample_emission(&scene.geometry, &plan.guide, u_pick, u_position, u_direction) else { return };
+    tally.observe.started(start.point.y, Some(&start));
     let h = plan.settings.heuristic;
     let d = &start.density;
     let hits = plan.settings.techniques.hit && !start.delta;
@@ -213,6 +213,7 @@ fn finish<R: Record, O: Observe>(
             light_delta: path.light_delta,
             light_vertex: 0,
             lens,
+            value,
         });
     }
 }

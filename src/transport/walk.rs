@@ -13,7 +13,7 @@ use super::vertex::{Scatter, Vertex};
 use super::{RayCounts, Technique};
 use crate::local::Equation;
 use crate::math::Random;
-use crate::scene::emitter::{EmitterPoint, NextEvent};
+use crate::scene::emitter::{Emission, EmitterPoint, NextEvent};
 use crate::scene::geometry::{End, Ray, offset_origin};
 use crate::scene::{Scene, Surface};
 use crate::spectrum::Spectrum;
@@ -178,13 +178,15 @@ pub struct Join<'a> {
     pub light_vertex: usize,
     /// The lens point of a splat.
     pub lens: Vec3,
+    /// What it adds to the measurement.
+    pub value: Spectrum,
 }
 
 /// Watches a walk without taking part in it: tests rebuild whole paths from what they see.
 /// The unit type watches nothing and costs nothing.
 pub trait Observe {
-    /// A walk starts: at a lens point, or at a light point (true: one that cannot be hit).
-    fn started(&mut self, _from: Vec3, _light: Option<(&EmitterPoint, bool)>) {}
+    /// A walk starts: at a lens point, or with an emission.
+    fn started(&mut self, _from: Vec3, _light: Option<&Emission>) {}
     /// A vertex was reached.
     fn arrived(&mut self, _surface: &Surface) {}
     /// A light vertex went into the cache.

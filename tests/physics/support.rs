@@ -3,11 +3,14 @@
 use glam::Vec2;
 use nephroid::math::Random;
 use nephroid::math::random::Family;
+use nephroid::render::{Options, Render};
 use nephroid::report::agreement::BlockSeries;
 use nephroid::scene::Scene;
+use nephroid::scene::emitter::Guide;
 use nephroid::transport::cache::{LightCache, LightVertex};
+use nephroid::transport::class::PathFilter;
 use nephroid::transport::gather::gather;
-use nephroid::transport::settings::{Plan, Settings};
+use nephroid::transport::settings::{Plan, Settings, Techniques};
 use nephroid::transport::shoot::shoot;
 use nephroid::transport::walk::{Context, Tally};
 use nephroid::transport::{Contribution, RayCounts, Record};
@@ -24,6 +27,13 @@ pub fn seed() -> u64 {
 /// The built scene of a text.
 pub fn scene(xml: &str) -> Scene {
     nephroid::load_str(xml, std::path::Path::new("."), &Default::default()).map(|l| l.scene).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Where light starts, as a bidirectional render would learn it: a good start for every join.
+pub fn learned(scene: &Scene, settings: &Settings) -> Guide {
+    let settings = Settings { techniques: Techniques::BIDIRECTIONAL, paths: PathFilter::default(), ..settings.clone() };
+    let options = Options { settings, ..Options::default() };
+    Render::new(scene, &options).expect("a film").plan().guide.clone()
 }
 
 /// Sums of one render by path length and block.
@@ -74,7 +84,8 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
     let mut settings = settings.clone();
     settings.max_length = settings.max_length.min(effort.max_length);
     // Any constant is a valid number of vertices for the weights.
-    let plan = Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0);
+    let plan =
+        Plan { guide: learned(scene, &settings), ..Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0) };
     let cx = Context { scene, plan: &plan };
     let renders: Vec<Vec<Vec<f64>>> = (0..effort.renders)
         .into_par_iter()

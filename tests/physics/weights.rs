@@ -1,10 +1,11 @@
 //! MIS weights: the recursion against the definition, on random numbers and on the walks' own paths.
 
 use crate::scenes;
-use crate::support::{scene, seed};
+use crate::support::{learned, scene, seed};
 use glam::Vec2;
 use nephroid::math::Random;
 use nephroid::math::random::Family;
+use nephroid::scene::emitter::Guide;
 use nephroid::transport::cache::LightCache;
 use nephroid::transport::gather::gather;
 use nephroid::transport::mis::Heuristic;
@@ -71,7 +72,8 @@ fn recursion_is_the_definition_for_100_000_random_paths() {
 fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scene::Scene, Plan, Vec<Testimony>) {
     let world = scene(xml);
     let film = world.film.clone();
-    let plan = Plan::new(settings, 64, film.width * film.height, 2.0);
+    let guide = if settings.guided { learned(&world, settings) } else { Guide::default() };
+    let plan = Plan { guide, ..Plan::new(settings, 64, film.width * film.height, 2.0) };
     let cx = Context { scene: &world, plan: &plan };
     let (mut witness, mut rays) = (Witness::default(), RayCounts::default());
     let crop = film.crop.unwrap_or([0, 0, film.width, film.height]);
@@ -147,6 +149,7 @@ fn walks_use_the_defined_weights_with_the_power_heuristic_and_without_some_joins
             techniques: Techniques::parse(techniques).unwrap(),
             heuristic: Heuristic::Power,
             max_length: 7,
+            guided: false,
             ..Settings::default()
         };
         walks_use_the_defined_weights(&settings, 1000, 200);

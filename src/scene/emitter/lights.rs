@@ -1,14 +1,13 @@
 //! All emitters of a scene with the densities of choosing them: the four questions of transport.
 
 use super::choice::Choice;
-use super::{Emission, EmissionDensity, Emitter, EmitterInfo, EmitterPoint, NextEvent};
+use super::{Emission, EmissionDensity, Emitter, EmitterInfo, EmitterPoint, Guide, NextEvent};
 use crate::math::{Frame, warp};
 use crate::scene::EmitterId;
-use crate::scene::geometry::Geometry;
+use crate::scene::geometry::{Geometry, ShapePoint};
 use crate::spectrum::Spectrum;
 use crate::texture::Textures;
 use glam::{Vec2, Vec3};
-use std::f32::consts::PI;
 
 /// All emitters of a scene. Without any that could light something, every sample is `None`.
 #[derive(Clone, Debug, Default)]
@@ -31,10 +30,9 @@ impl Lights {
     /// A light point as seen from `x`: the emitter by `u_pick`, the point by `u`. `None` is a sample
     /// of value zero (nothing shines from there to x), not a missing sample.
     #[inline]
-    pub fn sample_next_event(&self, geometry: &Geometry, x: Vec3, u_pick: f32, u: Vec2) -> Option<NextEvent> {
+    pub fn sample_next_event(&self, geometry: &Geometry, guide: &Guide, x: Vec3, u_pick: f32, u: Vec2) -> Option<NextEvent> {
         let choice = self.choice.as_ref()?;
         let (i, prob, _) = choice.next_event.sample(u_pick);
-        let prob_emission = choice.emission.prob(i);
         let emitter = EmitterId(i as u32);
         match &self.emitters[i] {
             Emitter::Area(area) => {
@@ -46,71 +44,54 @@ impl Lights {
                 if cos <= 0.0 || radiance.is_black() {
                     return None;
                 }
-                let emission = EmissionDensity { p_k: prob_emission * area.p_a, p_next: warp::hemisphere_cosine_p_w(cos) };
+                let emission = self.density_emission(geometry, guide, &point, -w, x);
                 let (g, nu) = (cos * inv_d2, prob * s.p_a);
                 Some(NextEvent { point, w, distance, radiance, g, inv_d2, nu, delta: false, emission })
             }
-            Emitter::Point(p) => self.finite_delta(emitter, x, p.position, prob, |_| (p.intensity, warp::SPHERE_UNIFORM_P_W)),
+            Emitter::Point(p) => {
+                let point = EmitterPoint::delta(emitter, p.position);
+                self.finite_delta(geometry, guide, point, x, prob, |_| p.intensity)
+            }
             Emitter::Spot(s) => {
-                let value = |w: Vec3| (s.intensity(&self.textures, w), s.density(w));
-                self.finite_delta(emitter, x, s.position, prob, value)
+                let point = EmitterPoint::delta(emitter, s.position);
+                self.finite_delta(geometry, guide, point, x, prob, |w| s.intensity(&self.textures, w))
             }
             Emitter::Parallel(p) => {
-                let emission = EmissionDensity { p_k: prob_emission, p_next: self.p_across };
-                Some(self.infinite(emitter, -p.direction, p.irradiance, prob, emission, true))
+                let point = EmitterPoint::at_infinity(emitter, -p.direction);
+                let emission = self.density_emission(geometry, guide, &point, p.direction, x);
+                Some(infinite(point, p.irradiance, prob, emission, true))
             }
             Emitter::Sky(sky) => {
                 let (w, p_w, radiance) = sky.sample(u);
                 if p_w <= 0.0 || radiance.is_black() {
                     return None;
                 }
-                let emission = EmissionDensity { p_k: prob_emission * p_w, p_next: self.p_across };
-                Some(self.infinite(emitter, w, radiance, prob * p_w, emission, false))
+                let point = EmitterPoint::at_infinity(emitter, w);
+                let emission = self.density_emission(geometry, guide, &point, -w, x);
+                Some(infinite(point, radiance, prob * p_w, emission, false))
             }
             Emitter::Dark => None,
         }
     }
 
-    /// Next event of a point or spot: `value` gives intensity and emission density of a direction.
+    /// Next event of a point or spot, `intensity` as a function of the direction of travel.
     #[inline]
     fn finite_delta(
         &self,
-        emitter: EmitterId,
+        geometry: &Geometry,
+        guide: &Guide,
+        point: EmitterPoint,
         x: Vec3,
-        y: Vec3,
         prob: f32,
-        value: impl FnOnce(Vec3) -> (Spectrum, f32),
+        intensity: impl FnOnce(Vec3) -> Spectrum,
     ) -> Option<NextEvent> {
-        let (w, distance, inv_d2) = toward(x, y)?;
-        let (radiance, p_next) = value(-w);
+        let (w, distance, inv_d2) = toward(x, point.y)?;
+        let radiance = intensity(-w);
         if radiance.is_black() {
             return None;
         }
-        Some(NextEvent {
-            point: EmitterPoint { emitter, y, y_error: 0.0, n_g: Vec3::ZERO, uv: Vec2::ZERO },
-            w,
-            distance,
-            radiance,
-            g: inv_d2,
-            inv_d2,
-            nu: prob,
-            delta: true,
-            emission: EmissionDensity { p_k: self.prob_emission(emitter), p_next },
-        })
-    }
-
-    #[inline]
-    fn infinite(
-        &self,
-        emitter: EmitterId,
-        w: Vec3,
-        radiance: Spectrum,
-        nu: f32,
-        emission: EmissionDensity,
-        delta: bool,
-    ) -> NextEvent {
-        let point = EmitterPoint::at_infinity(emitter, w);
-        NextEvent { point, w, distance: f32::INFINITY, radiance, g: 1.0, inv_d2: 1.0, nu, delta, emission }
+        let emission = self.density_emission(geometry, guide, &point, -w, x);
+        Some(NextEvent { point, w, distance, radiance, g: inv_d2, inv_d2, nu: prob, delta: true, emission })
     }
 
     /// ν of a light point as seen from `x` along the unit direction `w` (from x outwards): per m² of an
@@ -129,83 +110,135 @@ impl Lights {
 
     /// A light point and a direction of travel from it, with the flux they stand for.
     #[inline]
-    pub fn sample_emission(&self, geometry: &Geometry, u_pick: f32, u_position: Vec2, u_direction: Vec2) -> Option<Emission> {
-        let choice = self.choice.as_ref()?;
-        let (i, prob, _) = choice.emission.sample(u_pick);
+    pub fn sample_emission(
+        &self,
+        geometry: &Geometry,
+        guide: &Guide,
+        u_pick: f32,
+        u_position: Vec2,
+        u_direction: Vec2,
+    ) -> Option<Emission> {
+        let choice = guide.choice(&self.choice.as_ref()?.emission);
+        let (i, prob, _) = choice.sample(u_pick);
         let emitter = EmitterId(i as u32);
         match &self.emitters[i] {
             Emitter::Area(area) => {
-                let s = geometry.sample_area(area.shape, u_position);
-                let local = warp::hemisphere_cosine(u_direction);
-                let w = Frame::around(s.n_g).to_world(local);
-                let density = EmissionDensity { p_k: prob * area.p_a, p_next: warp::hemisphere_cosine_p_w(local.z) };
-                // Lᵉ·cosθ / (p_k·p_next), in which the cosine cancels.
-                let weight = self.textures.eval(area.radiance, s.uv) * (PI / density.p_k);
-                if local.z <= 0.0 || weight.is_black() {
+                let (s, w) = self.emit_from_area(geometry, guide, area.shape, (i, u_position, u_direction));
+                let cos = s.n_g.dot(w);
+                let radiance = self.textures.eval(area.radiance, s.uv);
+                if cos <= 0.0 || radiance.is_black() {
                     return None;
                 }
                 let point = EmitterPoint { emitter, y: s.p, y_error: s.p_error, n_g: s.n_g, uv: s.uv };
-                Some(Emission { point, w, weight, density, delta: false, infinite: false })
+                let density =
+                    EmissionDensity { p_k: prob * s.p_a, p_next: self.density_direction(geometry, guide, i, &point, w) };
+                emitted(point, w, radiance * cos, density, false, false)
             }
             Emitter::Point(p) => {
-                let w = warp::sphere_uniform(u_direction);
-                emit_from_point(emitter, p.position, w, p.intensity, warp::SPHERE_UNIFORM_P_W, prob)
+                let w = guide.direction(i, u_direction, warp::sphere_uniform);
+                let p_next = guide.direction_density(i, w, warp::SPHERE_UNIFORM_P_W);
+                let density = EmissionDensity { p_k: prob, p_next };
+                emitted(EmitterPoint::delta(emitter, p.position), w, p.intensity, density, true, false)
             }
             Emitter::Spot(s) => {
-                let (w, p_w) = s.sample(u_direction);
-                emit_from_point(emitter, s.position, w, s.intensity(&self.textures, w), p_w, prob)
+                let w = guide.direction(i, u_direction, |u| s.sample(u).0);
+                let density = EmissionDensity { p_k: prob, p_next: guide.direction_density(i, w, s.density(w)) };
+                emitted(EmitterPoint::delta(emitter, s.position), w, s.intensity(&self.textures, w), density, true, false)
             }
-            Emitter::Parallel(p) => self.emit_from_infinity(emitter, p.direction, p.irradiance, prob, u_position, true),
+            Emitter::Parallel(p) => self.emit_from_infinity(
+                guide,
+                EmitterPoint::at_infinity(emitter, -p.direction),
+                p.irradiance,
+                prob,
+                u_position,
+                true,
+            ),
             Emitter::Sky(sky) => {
                 let (w, p_w, radiance) = sky.sample(u_direction);
-                self.emit_from_infinity(emitter, -w, radiance, prob * p_w, u_position, false)
+                self.emit_from_infinity(guide, EmitterPoint::at_infinity(emitter, w), radiance, prob * p_w, u_position, false)
             }
             Emitter::Dark => None,
         }
     }
 
-    /// Starts on the disk behind the scene's sphere, across the direction of travel `w`.
+    /// A point of an area light (`p_a` given its direction where that comes first) and a direction.
+    #[inline]
+    fn emit_from_area(
+        &self,
+        geometry: &Geometry,
+        guide: &Guide,
+        shape: u32,
+        (emitter, u_position, u_direction): (usize, Vec2, Vec2),
+    ) -> (ShapePoint, Vec3) {
+        if geometry.is_outward_sphere(shape) {
+            let w = guide.direction(emitter, u_direction, warp::sphere_uniform);
+            if let Some(s) = geometry.sample_across(shape, w, u_position) {
+                return (s, w);
+            }
+        }
+        let s = geometry.sample_area(shape, u_position);
+        let w = guide.direction(emitter, u_direction, |u| Frame::around(s.n_g).to_world(warp::hemisphere_cosine(u)));
+        (s, w)
+    }
+
+    /// Starts on the disk behind the scene's sphere, across the direction of travel.
     #[inline]
     fn emit_from_infinity(
         &self,
-        emitter: EmitterId,
-        w: Vec3,
+        guide: &Guide,
+        point: EmitterPoint,
         radiance: Spectrum,
         p_k: f32,
         u_position: Vec2,
         delta: bool,
     ) -> Option<Emission> {
-        if p_k <= 0.0 || radiance.is_black() {
-            return None;
-        }
-        let at = warp::disk_concentric(u_position) * self.radius;
-        let frame = Frame::around(w);
+        let w = point.n_g;
+        let disk = guide.place(point.emitter.0 as usize, u_position);
+        let (at, frame) = (disk * self.radius, Frame::around(w));
         let y = self.center + frame.s * at.x + frame.t * at.y - w * self.radius;
-        Some(Emission {
-            point: EmitterPoint { emitter, y, y_error: 0.0, n_g: w, uv: Vec2::ZERO },
-            w,
-            weight: radiance * (1.0 / (p_k * self.p_across)),
-            density: EmissionDensity { p_k, p_next: self.p_across },
-            delta,
-            infinite: true,
-        })
+        let p_next = self.p_across * guide.place_density(point.emitter.0 as usize, disk);
+        emitted(EmitterPoint { y, ..point }, w, radiance, EmissionDensity { p_k, p_next }, delta, true)
     }
 
-    /// Densities with which [`Self::sample_emission`] makes `point` and the direction of travel.
+    /// Densities with which [`Self::sample_emission`] makes `point` and what follows: the direction of
+    /// travel and, for infinite emitters, the place across it, which `x` (a point ahead) tells.
     #[inline]
-    pub fn density_emission(&self, point: &EmitterPoint, w_travel: Vec3) -> EmissionDensity {
+    pub fn density_emission(
+        &self,
+        geometry: &Geometry,
+        guide: &Guide,
+        point: &EmitterPoint,
+        w_travel: Vec3,
+        x: Vec3,
+    ) -> EmissionDensity {
         let Some((choice, i)) = self.chosen(point.emitter) else { return EmissionDensity::default() };
-        let prob = choice.emission.prob(i);
-        match &self.emitters[i] {
-            Emitter::Area(area) => {
-                EmissionDensity { p_k: prob * area.p_a, p_next: warp::hemisphere_cosine_p_w(point.n_g.dot(w_travel)) }
-            }
-            Emitter::Point(_) => EmissionDensity { p_k: prob, p_next: warp::SPHERE_UNIFORM_P_W },
-            Emitter::Spot(s) => EmissionDensity { p_k: prob, p_next: s.density(w_travel) },
-            Emitter::Parallel(_) => EmissionDensity { p_k: prob, p_next: self.p_across },
-            Emitter::Sky(sky) => EmissionDensity { p_k: prob * sky.density(-w_travel), p_next: self.p_across },
-            Emitter::Dark => EmissionDensity::default(),
-        }
+        let prob = guide.choice(&choice.emission).prob(i);
+        let p_k = match &self.emitters[i] {
+            Emitter::Area(area) => prob * geometry.density_across(area.shape, point.n_g, w_travel).unwrap_or(area.p_a),
+            Emitter::Point(_) | Emitter::Spot(_) | Emitter::Parallel(_) => prob,
+            Emitter::Sky(sky) => prob * sky.density(-w_travel),
+            Emitter::Dark => return EmissionDensity::default(),
+        };
+        let p_next = match &self.emitters[i] {
+            Emitter::Parallel(_) | Emitter::Sky(_) => self.p_across * guide.place_density(i, self.disk(w_travel, x)),
+            _ => self.density_direction(geometry, guide, i, point, w_travel),
+        };
+        EmissionDensity { p_k, p_next }
+    }
+
+    /// Density per steradian of the direction of travel from a finite emitter.
+    #[inline]
+    fn density_direction(&self, geometry: &Geometry, guide: &Guide, i: usize, point: &EmitterPoint, w: Vec3) -> f32 {
+        let own = match &self.emitters[i] {
+            Emitter::Area(area) => match geometry.density_across(area.shape, point.n_g, w) {
+                Some(_) => warp::SPHERE_UNIFORM_P_W,
+                None => warp::hemisphere_cosine_p_w(point.n_g.dot(w)),
+            },
+            Emitter::Point(_) => warp::SPHERE_UNIFORM_P_W,
+            Emitter::Spot(s) => s.density(w),
+            _ => return 0.0,
+        };
+        guide.direction_density(i, w, own)
     }
 
     /// Lᵉ of a light point that was hit, along the direction of travel: black from behind and for
@@ -296,11 +329,6 @@ impl Lights {
         let i = emitter.0 as usize;
         if i < self.emitters.len() { Some((self.choice.as_ref()?, i)) } else { None }
     }
-
-    #[inline]
-    fn prob_emission(&self, emitter: EmitterId) -> f32 {
-        self.chosen(emitter).map_or(0.0, |(choice, i)| choice.emission.prob(i))
-    }
 }
 
 /// Unit direction, distance and 1/d² from `x` to `y`; `None` where they are too near to have any.
@@ -315,17 +343,24 @@ fn toward(x: Vec3, y: Vec3) -> Option<(Vec3, f32, f32)> {
     Some((v / d, d, 1.0 / d2))
 }
 
+/// A start of flux `value / (p_k·p_next)`, value = Lᵉ·cosθ; `None` where that is nothing.
 #[inline]
-fn emit_from_point(emitter: EmitterId, y: Vec3, w: Vec3, intensity: Spectrum, p_w: f32, prob: f32) -> Option<Emission> {
-    if p_w <= 0.0 || intensity.is_black() {
+fn emitted(
+    point: EmitterPoint,
+    w: Vec3,
+    value: Spectrum,
+    density: EmissionDensity,
+    delta: bool,
+    infinite: bool,
+) -> Option<Emission> {
+    let p = density.p_k * density.p_next;
+    if p <= 0.0 || value.is_black() {
         return None;
     }
-    Some(Emission {
-        point: EmitterPoint { emitter, y, y_error: 0.0, n_g: Vec3::ZERO, uv: Vec2::ZERO },
-        w,
-        weight: intensity * (1.0 / (prob * p_w)),
-        density: EmissionDensity { p_k: prob, p_next: p_w },
-        delta: true,
-        infinite: false,
-    })
+    Some(Emission { point, w, weight: value * (1.0 / p), density, delta, infinite })
+}
+
+#[inline]
+fn infinite(point: EmitterPoint, radiance: Spectrum, nu: f32, emission: EmissionDensity, delta: bool) -> NextEvent {
+    NextEvent { point, w: -point.n_g, distance: f32::INFINITY, radiance, g: 1.0, inv_d2: 1.0, nu, delta, emission }
 }

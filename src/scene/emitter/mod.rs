@@ -9,11 +9,12 @@
 //! | emitter | ν | p_k | p_next | can be hit |
 //! |---|---|---|---|---|
 //! | area | P_n·p_A(y given x), m⁻² | P_e/A, m⁻² | cosθ/π, sr⁻¹ | yes |
+//! | sphere, outside | P_n·p_A(y given x), m⁻² | P_e·cosθ/πr², m⁻² | 1/4π, sr⁻¹ | yes |
 //! | point, spot | P_n | P_e | 1/4π, cone, sr⁻¹ | no |
 //! | parallel | P_n | P_e | 1/πR², m⁻² | no |
 //! | sky: constant, image, sun disk | P_n·p_w, sr⁻¹ | P_e·p_w, sr⁻¹ | 1/πR², m⁻² | yes |
 //!
-//! P_n and P_e are the probabilities of choosing the emitter (`choice`), R the radius of the
+//! p_next is what a [`Guide`] changes, and P_e. P_n and P_e are the probabilities of choosing the emitter (`choice`), R the radius of the
 //! sphere around the scene; infinite emitters shoot from a disk of that radius across the direction.
 //! The set of emitters is closed: an enum, matched once per question.
 
@@ -21,6 +22,7 @@ mod area;
 mod build;
 mod choice;
 mod envmap;
+pub mod guide;
 mod lights;
 mod parallel;
 mod point;
@@ -31,6 +33,7 @@ mod sun;
 mod tests;
 
 pub use build::EmitterInfo;
+pub use guide::Guide;
 pub use lights::Lights;
 
 use crate::scene::{EmitterId, Surface};
@@ -63,6 +66,12 @@ impl EmitterPoint {
     #[inline]
     pub fn on_surface(s: &Surface) -> Self {
         Self { emitter: s.emitter, y: s.p, y_error: s.p_error, n_g: s.n_g, uv: s.uv }
+    }
+
+    /// The place of a point or spot.
+    #[inline]
+    pub fn delta(emitter: EmitterId, y: Vec3) -> Self {
+        Self { emitter, y, y_error: 0.0, n_g: Vec3::ZERO, uv: Vec2::ZERO }
     }
 
     /// The point at infinity that a walk leaving the scene along `w_out` has hit.

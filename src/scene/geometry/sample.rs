@@ -5,9 +5,10 @@
 
 use super::analytic::Analytic;
 use super::bake::Sampler;
+use super::sphere::Sphere;
 use super::surface::{normal_of, rounded_error, triangle_error};
 use super::{Geometry, triangle};
-use crate::math::warp::{ONE_MINUS_EPSILON, triangle_uniform};
+use crate::math::warp::{ONE_MINUS_EPSILON, disk_concentric, triangle_uniform};
 use glam::{DVec3, Vec2, Vec3};
 
 /// A point drawn on a shape.
@@ -76,6 +77,40 @@ impl Geometry {
         }
         let at = self.sample_area(shape, u);
         (at.p_a > 0.0 && at.p_a.is_finite()).then_some(at)
+    }
+
+    /// A point of a sphere uniform across the unit direction `w`, in which it shines there: light that
+    /// leaves along `w` then has one value per direction. `None` for other shapes.
+    pub fn sample_across(&self, shape: u32, w: Vec3, u: Vec2) -> Option<ShapePoint> {
+        let sphere = self.outward_sphere(shape)?;
+        let mut at = point(sphere.sample_across(w, disk_concentric(u))?, 0.0);
+        at.p_a = self.density_across(shape, at.n_g, w)?;
+        Some(at)
+    }
+
+    /// Density per unit area of [`Self::sample_across`] at a point with normal `n_g`: cosθ/(πr²).
+    #[inline]
+    pub fn density_across(&self, shape: u32, n_g: Vec3, w: Vec3) -> Option<f32> {
+        self.outward_sphere(shape)?;
+        // πr² is a quarter of the area.
+        Some(n_g.dot(w).max(0.0) * (4.0 / self.samplers[shape as usize].1) as f32)
+    }
+
+    /// Is it a sphere that shines outwards?
+    #[inline]
+    pub fn is_outward_sphere(&self, shape: u32) -> bool {
+        self.outward_sphere(shape).is_some()
+    }
+
+    #[inline]
+    fn outward_sphere(&self, shape: u32) -> Option<&Sphere> {
+        if let Sampler::Analytic { index } = self.samplers[shape as usize].0
+            && let Analytic::Sphere(sphere) = &self.tree.analytic[index as usize].0
+            && sphere.is_outward()
+        {
+            return Some(sphere);
+        }
+        None
     }
 
     /// Density per unit area with which [`Self::sample_toward`] draws the point `y` with normal

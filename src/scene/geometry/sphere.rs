@@ -85,6 +85,23 @@ impl Sphere {
         (self.center + out * self.radius, out * self.side, uv(self.own(out)))
     }
 
+    /// A point uniform across the unit direction `w` on the side that shines along it: density
+    /// cosθ/(πr²); `None` where the sphere shines inwards.
+    pub(super) fn sample_across(&self, w: Vec3, disk: Vec2) -> Option<(DVec3, DVec3, Vec2)> {
+        if self.side < 0.0 {
+            return None;
+        }
+        let axis = w.as_dvec3().normalize();
+        let (s, t) = axis.any_orthonormal_pair();
+        let d = disk.as_dvec2();
+        Some(self.point((s * d.x + t * d.y + axis * (1.0 - d.length_squared()).max(0.0).sqrt()).normalize()))
+    }
+
+    /// Shines outwards?
+    pub(super) fn is_outward(&self) -> bool {
+        self.side > 0.0
+    }
+
     /// sin²θ_max of the cone in which x sees the outside of the sphere; `None` where x is not safely
     /// outside or the sphere shines inwards: there sampling is uniform by area.
     #[inline]

@@ -162,14 +162,17 @@ fn area_emission() {
     let mut random = Random::new(Family::Other, 6, 0, 0);
     let inverse = to_world.inverse();
     for _ in 0..n {
-        let e = world.lights.sample_emission(&world.geometry, random.unit(), random.unit2(), random.unit2()).expect("lit");
+        let e = world
+            .lights
+            .sample_emission(&world.geometry, &Guide::default(), random.unit(), random.unit2(), random.unit2())
+            .expect("lit");
         let p = inverse.transform_point3(e.point.y) * 0.5 + 0.5;
         let at = |a: f32, b: f32| ((a * bins as f32) as usize).min(bins - 1) * bins + ((b * bins as f32) as usize).min(bins - 1);
         observed[0][at(p.x, p.y)] += 1.0;
         let local = Frame::around(e.point.n_g).to_local(e.w);
         // cos² is uniform where the density is cosθ/π.
         observed[1][at(local.z * local.z, local.y.atan2(local.x) / std::f32::consts::TAU + 0.5)] += 1.0;
-        let d = world.lights.density_emission(&e.point, e.w);
+        let d = world.lights.density_emission(&world.geometry, &Guide::default(), &e.point, e.w, e.point.y);
         assert!((d.p_k / e.density.p_k - 1.0).abs() < 1e-5 && (d.p_next / e.density.p_next - 1.0).abs() < 1e-4);
         assert!((e.density.p_k * 4.0 - 1.0).abs() < 1e-5, "the rectangle's area is 4, p_k = {}", e.density.p_k);
     }
@@ -187,12 +190,15 @@ fn infinite_emission_starts_on_the_disk() {
     let mut random = Random::new(Family::Other, 7, 0, 0);
     let n = 50_000;
     for _ in 0..n {
-        let e = world.lights.sample_emission(&world.geometry, random.unit(), random.unit2(), random.unit2()).expect("lit");
+        let e = world
+            .lights
+            .sample_emission(&world.geometry, &Guide::default(), random.unit(), random.unit2(), random.unit2())
+            .expect("lit");
         let v = e.point.y - center;
         assert!((v.dot(e.w) + radius).abs() < 1e-4 * radius && e.infinite && !e.delta);
         let across = v + e.w * radius;
         observed[((across.length_squared() / radius.powi(2) * 32.0) as usize).min(31)] += 1.0;
-        let d = world.lights.density_emission(&e.point, e.w);
+        let d = world.lights.density_emission(&world.geometry, &Guide::default(), &e.point, e.w, e.point.y);
         assert!((d.p_k / e.density.p_k - 1.0).abs() < 0.02 || random.unit() < 1e-3);
         assert_eq!(d.p_next, e.density.p_next);
     }

@@ -58,16 +58,76 @@ fn mean(samples: impl Iterator<Item = f64>) -> (f64, f64) {
     (mean, ((squares / n - mean * mean) / n).max(0.0).sqrt())
 }
 
+/// What a pilot might learn: some emitters, directions and places matter more than others.
+fn learned(world: &World) -> Guide {
+    let mut guide = Guide::new(&world.lights);
+    let mut random = Random::new(Family::Other, 21, 0, 0);
+    for _ in 0..4 {
+        for _ in 0..20_000 {
+            let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
+            let e = world.lights.sample_emission(&world.geometry, &guide, pick, position, direction);
+            if let Some((e, start)) = e.and_then(|e| Some((e, world.lights.start(&guide, &e)?))) {
+                let ahead = (e.w.x + 0.3 * e.w.y - 0.4).abs() < 0.1 || (e.infinite && e.point.y.y > 0.5);
+                let flux = e.weight.mean() * (1 + start.emitter) as f32;
+                guide.learn(&start, if ahead { f64::from(flux) } else { 0.0 });
+            }
+        }
+        guide = guide.refined(&world.lights);
+    }
+    guide
+}
+
 #[test]
 fn emitted_flux_is_power() {
     let world = everything();
+    for (info, prob) in world.lights.infos().iter().zip(flux_is_power(&world, &Guide::default())) {
+        assert!(prob <= f64::from(info.prob_emission) + 0.01, "{}: chosen {prob} of the time", info.kind);
+    }
+}
+
+#[test]
+fn emitted_flux_is_power_when_guided() {
+    let world = everything();
+    flux_is_power(&world, &learned(&world));
+}
+
+/// A guide's densities are those of its samples, and it does send light where it was told to.
+#[test]
+fn guided_densities_are_told() {
+    let world = everything();
+    let (unguided, guided) = (Guide::default(), learned(&world));
+    let mut random = Random::new(Family::Other, 22, 0, 0);
+    let (n, mut ahead) = (50_000, [[0.0f64; 2]; 2]);
+    for _ in 0..n {
+        let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
+        for (guide, ahead) in [&unguided, &guided].into_iter().zip(&mut ahead) {
+            let e = world.lights.sample_emission(&world.geometry, guide, pick, position, direction);
+            let Some(e) = e else { continue };
+            // A point ahead, as a vertex of the walk would be.
+            let x = e.point.y + e.w * 2.0;
+            let d = world.lights.density_emission(&world.geometry, guide, &e.point, e.w, x);
+            let same = |a: f32, b: f32| (a - b).abs() <= 2e-3 * a.max(b);
+            let border = random.unit() < 1e-2;
+            assert!(border || (same(d.p_k, e.density.p_k) && same(d.p_next, e.density.p_next)), "{d:?} for {:?}", e.density);
+            // Areas and the point: the directions of the others are their own.
+            if e.point.emitter.0 < 4 {
+                ahead[usize::from((e.w.x + 0.3 * e.w.y - 0.4).abs() < 0.1)] += 1.0;
+            }
+        }
+    }
+    let [unguided, guided] = ahead.map(|[aside, ahead]| ahead / (aside + ahead));
+    assert!(guided > 2.5 * unguided, "a share of {unguided} went ahead unguided, of {guided} guided");
+}
+
+/// Checks every emitter; how often each was chosen and shone.
+fn flux_is_power(world: &World, guide: &Guide) -> Vec<f64> {
     assert_eq!(world.problems, Problems::default());
     let mut random = Random::new(Family::Other, 1, 0, 0);
     let n = 200_000;
     let mut parts = vec![vec![]; world.lights.infos().len()];
     for _ in 0..n {
         let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
-        if let Some(e) = world.lights.sample_emission(&world.geometry, pick, position, direction) {
+        if let Some(e) = world.lights.sample_emission(&world.geometry, guide, pick, position, direction) {
             parts[e.point.emitter.0 as usize].push(f64::from(e.weight.mean()));
         }
     }
@@ -75,9 +135,8 @@ fn emitted_flux_is_power() {
         let power = f64::from(info.power.iter().sum::<f32>() / 3.0);
         let (got, error) = mean(part.iter().copied().chain(std::iter::repeat_n(0.0, n - part.len())));
         assert!((got - power).abs() < 4.5 * error + 2e-3 * power, "{}: {got} ± {error} W for {power} W", info.kind);
-        let prob = part.len() as f64 / n as f64;
-        assert!(prob <= f64::from(info.prob_emission) + 0.01, "{}: chosen {prob} of the time", info.kind);
     }
+    parts.iter().map(|part| part.len() as f64 / n as f64).collect()
 }
 
 /// Closed forms: area π·L·A, constant 4π·L·πR², sun disk E·πR²·2(1−cosα)/sin²α.
@@ -151,7 +210,7 @@ fn next_events_give_the_irradiance() {
     for (x, n) in [(Vec3::new(0.2, -0.3, 0.0), Vec3::Z), (Vec3::new(1.0, 0.9, 0.4), Vec3::new(0.3, 0.5, 0.8).normalize())] {
         let exact = irradiance(&world, x, n);
         let (got, error) = mean((0..200_000).map(|_| {
-            let event = world.lights.sample_next_event(&world.geometry, x, random.unit(), random.unit2());
+            let event = world.lights.sample_next_event(&world.geometry, &Guide::default(), x, random.unit(), random.unit2());
             event.map_or(0.0, |e| f64::from(e.radiance.mean() * e.g / e.nu * e.w.dot(n).max(0.0)))
         }));
         assert!((got - exact).abs() < 4.5 * error + 2e-3 * exact, "{got} ± {error} for {exact}");
@@ -166,9 +225,11 @@ fn hits_and_next_events_agree_on_densities() {
     let mut random = Random::new(Family::Other, 3, 0, 0);
     let x = Vec3::new(0.1, 0.2, 0.3);
     for _ in 0..20_000 {
-        let Some(e) = world.lights.sample_next_event(&world.geometry, x, random.unit(), random.unit2()) else { continue };
+        let Some(e) = world.lights.sample_next_event(&world.geometry, &Guide::default(), x, random.unit(), random.unit2()) else {
+            continue;
+        };
         let same = |a: f32, b: f32| (a - b).abs() <= 2e-3 * a.max(b);
-        let emission = world.lights.density_emission(&e.point, -e.w);
+        let emission = world.lights.density_emission(&world.geometry, &Guide::default(), &e.point, -e.w, x);
         // A direction at a cell's border may fall into the neighbouring cell by rounding.
         let slip = e.distance.is_infinite() && random.unit() < 1e-2;
         assert!(slip || same(emission.p_k, e.emission.p_k), "{emission:?} for {:?}", e.emission);
@@ -194,7 +255,10 @@ fn points_for_the_direct_view() {
     for _ in 0..n {
         if let Some((point, p_k)) = world.lights.sample_point(&world.geometry, random.unit(), random.unit2()) {
             let w = point.n_g;
-            assert!((world.lights.density_emission(&point, w).p_k / p_k - 1.0).abs() < 0.02 || random.unit() < 1e-2);
+            let d = world.lights.density_emission(&world.geometry, &Guide::default(), &point, w, Vec3::ZERO);
+            // Straight ahead the cosine's density is 1/π; a sphere's emission is the same product.
+            let own = if point.emitter.0 < 3 { d.p_k * d.p_next * std::f32::consts::PI } else { d.p_k };
+            assert!((own / p_k - 1.0).abs() < 0.02 || random.unit() < 1e-2);
             sums[point.emitter.0 as usize] += f64::from(world.lights.radiance(&point, w).mean() / p_k) / f64::from(n);
         }
     }

@@ -1,0 +1,197 @@
+//! Guided emission: which light, and where to from it, as learned from what light paths contributed.
+//!
+//! Most of what a lamp emits never reaches a picture; a caustic is fed by the small part that meets the
+//! glass. A guide holds, for each emitter that matters, a density on the unit square
+//! ([`Quadtree`]) that stands for what is free in its emission:
+//!
+//! | emitter | the square is | unguided density |
+//! |---|---|---|
+//! | area | direction of travel ([`warp::sphere_charts`]) | cosθ/π around the normal |
+//! | sphere, from outside | direction of travel; the position is uniform across it | 1/4π |
+//! | point, spot | direction of travel | the emitter's own |
+//! | parallel, sky | place on the disk across the direction of travel | 1/πR² |
+//!
+//! and the probability of choosing each emitter. The unguided density is always mixed in
+//! ([`UNGUIDED`]), so that no path is lost and no contribution grows by more than its inverse. What the
+//! guide learns is decided by the caller (a pilot); the densities it changes are those of emission
+//! alone, so every weight sees the change through [`super::EmissionDensity`] and the measurement stays
+//! unbiased whatever was learned. Compare [Vorba 2014], who guide both walkers.
+
+use super::{Emission, Emitter, Lights};
+use crate::math::Frame;
+use crate::math::distribution::Discrete;
+use crate::math::quadtree::{MEMORY, Quadtree};
+use crate::math::warp;
+use glam::{Vec2, Vec3};
+use std::f32::consts::PI;
+
+/// Share of the unguided density in every guided one.
+pub const UNGUIDED: f32 = 0.2;
+/// Share of the unguided probability in the choice of the emitter.
+const UNGUIDED_CHOICE: f64 = 0.2;
+/// So many emitters, the most probable ones, have a square of their own.
+const MOST_SQUARES: usize = 64;
+
+/// Learned densities of emission; the default guides nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Guide {
+    squares: Vec<Option<Quadtree>>,
+    /// Σ over light paths of (value)² times the probability of the emitter.
+    moments: Vec<f64>,
+    choice: Option<Discrete>,
+}
+
+/// Where in the guide's squares a light path started, and how probable that was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// Index of the emitter.
+    pub emitter: usize,
+    /// Probability of its choice.
+    pub prob: f32,
+    /// Point of its square.
+    pub at: Vec2,
+    /// Density of that point per unit area of the square.
+    pub p: f32,
+}
+
+impl Guide {
+    /// A guide that has learned nothing yet and can learn of the emitters of `lights`.
+    pub fn new(lights: &Lights) -> Self {
+        let infos = lights.infos();
+        let mut order: Vec<usize> = (0..infos.len()).collect();
+        order.sort_by(|a, b| infos[*b].prob_emission.total_cmp(&infos[*a].prob_emission).then(a.cmp(b)));
+        let mut squares = vec![None; infos.len()];
+        for i in order.into_iter().take(MOST_SQUARES).filter(|i| infos[*i].prob_emission > 0.0) {
+            squares[i] = Some(Quadtree::default());
+        }
+        Self { squares, moments: vec![0.0; infos.len()], choice: None }
+    }
+
+    /// A light path that started at `start` contributed `value` (any measure of what it adds to the
+    /// noise, non-negative).
+    pub fn learn(&mut self, start: &Start, value: f64) {
+        let square = value * value * f64::from(start.prob);
+        if !(square > 0.0 && square.is_finite()) {
+            return;
+        }
+        self.moments[start.emitter] += square;
+        if let Some(tree) = &mut self.squares[start.emitter] {
+            tree.learn(start.at, square * f64::from(start.p));
+        }
+    }
+
+    /// The guide that follows from what was learned.
+    #[must_use]
+    pub fn refined(&self, lights: &Lights) -> Self {
+        let total: f64 = self.moments.iter().map(|m| m.sqrt()).sum();
+        let choice = if total > 0.0 && total.is_finite() {
+            let prob = |(moment, info): (&f64, &super::EmitterInfo)| {
+                (1.0 - UNGUIDED_CHOICE) * moment.sqrt() / total + UNGUIDED_CHOICE * f64::from(info.prob_emission)
+            };
+            Discrete::new(self.moments.iter().zip(lights.infos()).map(prob))
+        } else {
+            None
+        };
+        let squares = self.squares.iter().map(|s| s.as_ref().map(|tree| tree.refined(0.0))).collect();
+        Self { squares, moments: self.moments.iter().map(|m| MEMORY * m).collect(), choice }
+    }
+
+    /// Memory held, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.squares.iter().flatten().map(Quadtree::bytes).sum::<usize>() + size_of_val(&self.squares[..])
+    }
+
+    /// The learned choice of the emitter, if there is one.
+    #[inline]
+    pub(super) fn choice<'a>(&'a self, unguided: &'a Discrete) -> &'a Discrete {
+        self.choice.as_ref().unwrap_or(unguided)
+    }
+
+    #[inline]
+    fn square(&self, emitter: usize) -> Option<&Quadtree> {
+        // Without a choice nothing was learned: the squares are uniform, which no emitter is.
+        self.choice.as_ref()?;
+        self.squares.get(emitter)?.as_ref()
+    }
+
+    /// A direction of travel from `emitter`: by its own sampling (`own`) or the learned one.
+    #[inline]
+    pub(super) fn direction(&self, emitter: usize, u: Vec2, own: impl FnOnce(Vec2) -> Vec3) -> Vec3 {
+        match self.square(emitter) {
+            None => own(u),
+            Some(tree) => match split(u) {
+                (true, u) => own(u),
+                (false, u) => warp::sphere_charts(tree.sample(u).0),
+            },
+        }
+    }
+
+    /// Density per steradian of [`Self::direction`], `own` that of the emitter's own sampling.
+    #[inline]
+    pub(super) fn direction_density(&self, emitter: usize, w: Vec3, own: f32) -> f32 {
+        match self.square(emitter) {
+            None => own,
+            Some(tree) => {
+                let learned = tree.density(warp::sphere_charts_inverse(w)) * warp::SPHERE_UNIFORM_P_W;
+                UNGUIDED * own + (1.0 - UNGUIDED) * learned
+            }
+        }
+    }
+
+    /// A place on the unit disk across the direction of travel.
+    #[inline]
+    pub(super) fn place(&self, emitter: usize, u: Vec2) -> Vec2 {
+        warp::disk_concentric(match self.square(emitter) {
+            None => u,
+            Some(tree) => match split(u) {
+                (true, u) => u,
+                (false, u) => tree.sample(u).0,
+            },
+        })
+    }
+
+    /// Density of [`Self::place`] relative to the uniform one.
+    #[inline]
+    pub(super) fn place_density(&self, emitter: usize, disk: Vec2) -> f32 {
+        match self.square(emitter) {
+            None => 1.0,
+            Some(tree) => UNGUIDED + (1.0 - UNGUIDED) * tree.density(warp::disk_concentric_inverse(disk)),
+        }
+    }
+}
+
+impl Lights {
+    /// Where a light path started, as the guide sees it; `None` for what it cannot learn.
+    pub fn start(&self, guide: &Guide, e: &Emission) -> Option<Start> {
+        let emitter = e.point.emitter.0 as usize;
+        let prob = guide.choice(&self.choice.as_ref()?.emission).prob(emitter);
+        let (at, p) = match &self.emitters[emitter] {
+            Emitter::Area(_) | Emitter::Point(_) | Emitter::Spot(_) => {
+                (warp::sphere_charts_inverse(e.w), e.density.p_next * (4.0 * PI))
+            }
+            Emitter::Parallel(_) | Emitter::Sky(_) => {
+                (warp::disk_concentric_inverse(self.disk(e.w, e.point.y)), e.density.p_next / self.p_across)
+            }
+            Emitter::Dark => return None,
+        };
+        Some(Start { emitter, prob, at, p })
+    }
+
+    /// Place of `x` on the unit disk across the direction of travel `w`.
+    #[inline]
+    pub(super) fn disk(&self, w: Vec3, x: Vec3) -> Vec2 {
+        let frame = Frame::around(w);
+        let v = (x - self.center) * (1.0 / self.radius);
+        Vec2::new(v.dot(frame.s), v.dot(frame.t))
+    }
+}
+
+/// Does `u` fall to the unguided part, and where in its part?
+#[inline]
+fn split(u: Vec2) -> (bool, Vec2) {
+    if u.x < UNGUIDED {
+        (true, Vec2::new((u.x / UNGUIDED).min(warp::ONE_MINUS_EPSILON), u.y))
+    } else {
+        (false, Vec2::new(((u.x - UNGUIDED) / (1.0 - UNGUIDED)).min(warp::ONE_MINUS_EPSILON), u.y))
+    }
+}
