@@ -14,6 +14,7 @@
 //! - [`transport`]: the walks and the measurement.
 //! - [`film`]: exact accumulation into images.
 //! - [`render`]: passes of walks into a film, under a budget.
+//! - [`elements`]: the rendering equation of diffuse scenes as a finite system of equations.
 //! - [`io`]: one file per format.
 //! - [`report`]: comparison of images.
 //! - [`cli`]: the command line.
@@ -35,6 +36,7 @@
 
 pub mod cli;
 pub mod describe;
+pub mod elements;
 pub mod film;
 pub mod io;
 pub mod local;

@@ -66,6 +66,44 @@ pub enum EstimatorName {
     Bidirectional,
     /// What the scene's integrator element asks for.
     Scene,
+    /// Diffuse scenes as a matrix equation, solved by elimination.
+    Invert,
+    /// Diffuse scenes as a matrix equation, solved by --iteration.
+    Iterate,
+}
+
+/// Iterations by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum IterationName {
+    /// All elements gather at once.
+    #[default]
+    Jacobi,
+    /// One element after another gathers.
+    GaussSeidel,
+    /// The element with the most unshot flux shoots.
+    Southwell,
+    /// Rays instead of a matrix, for very many elements.
+    Stochastic,
+}
+
+/// How elements are shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ElementViewName {
+    /// What arrives is interpolated, textures are exact.
+    #[default]
+    Smooth,
+    /// One colour for each element: the solution itself.
+    Flat,
+}
+
+/// Where elements are small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum SubdivisionName {
+    /// Where radiance varies.
+    #[default]
+    Adaptive,
+    /// Nowhere.
+    Uniform,
 }
 
 /// Joins of walks by name.
@@ -107,7 +145,7 @@ pub struct RenderArgs {
     /// The scene.
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Image to write: .exr (linear, with variance) or .png (repeatable).
+    /// Image to write: .exr (linear, with variance) or .png; of finite elements also .ply (repeatable).
     #[arg(short, long = "output", value_name = "OUT", required = true, value_hint = ValueHint::FilePath)]
     pub output: Vec<PathBuf>,
     /// Which equation to expand.
@@ -143,6 +181,41 @@ pub struct RenderArgs {
     /// Transport.
     #[command(flatten, next_help_heading = "Transport")]
     pub transport: TransportArgs,
+    /// Finite elements.
+    #[command(flatten, next_help_heading = "Finite elements (--estimator invert, iterate)")]
+    pub elements: ElementsArgs,
+}
+
+/// Into which elements surfaces are cut, and how their equation is solved.
+#[derive(Clone, Debug, Args)]
+pub struct ElementsArgs {
+    /// Most elements; at least one for each side of a triangle that reflects or emits.
+    #[arg(long = "elements", value_name = "N", default_value_t = 4000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub count: u32,
+    /// Where elements are small.
+    #[arg(long, value_enum, value_name = "NAME", default_value_t)]
+    pub subdivision: SubdivisionName,
+    /// Subdivide no further than to this relative error bound.
+    #[arg(long, value_name = "E", value_parser = positive)]
+    pub element_error: Option<f64>,
+    /// Rays from each element on average.
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..))]
+    pub element_rays: u32,
+    /// How to iterate.
+    #[arg(long, value_enum, value_name = "NAME", default_value_t)]
+    pub iteration: IterationName,
+    /// Most iterations [default: 64 stochastic ones, else 10000].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub iterations: Option<u32>,
+    /// Iterate until this share of the sources' flux is left as residual.
+    #[arg(long, value_name = "R", default_value_t = 1e-10, value_parser = positive)]
+    pub residual: f64,
+    /// Between the elements: nothing, or interpolated.
+    #[arg(long, value_enum, value_name = "NAME", default_value_t)]
+    pub element_view: ElementViewName,
+    /// Write the residual after every iteration.
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    pub residual_log: Option<PathBuf>,
 }
 
 /// Which paths, by which joins.
@@ -203,6 +276,10 @@ pub struct CompareArgs {
     /// What the tolerance is about.
     #[arg(long, value_enum, default_value_t, requires = "tolerance")]
     pub metric: Metric,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).ok_or_else(|| "expected a number above 0".into())
 }
 
 fn finite(text: &str) -> Result<f64, String> {

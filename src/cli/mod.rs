@@ -6,10 +6,12 @@
 //! - [`args`], [`units`]: what can be written.
 //! - [`open`]: a scene file into a built scene.
 //! - [`render`], [`output`], [`progress`], [`interrupt`]: rendering.
+//! - [`elements`]: rendering by finite elements.
 //! - [`info`], [`compare`]: the other subcommands.
 
 pub mod args;
 pub mod compare;
+pub mod elements;
 pub mod info;
 pub mod interrupt;
 pub mod open;

@@ -51,6 +51,11 @@ impl Outputs {
         self.paths.iter().filter_map(|path| write_image(path, &file, self.png).err()).collect()
     }
 
+    /// There are none.
+    pub fn is_empty(&self) -> bool {
+        self.paths.is_empty()
+    }
+
     /// The files' names, for people.
     pub fn names(&self) -> String {
         self.paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ")
@@ -68,7 +73,7 @@ pub fn memory_needed(width: u32, height: u32, light_paths: Option<u32>, shoots: 
 
 /// Refuses a film beyond the limit, or beyond what the machine has free where no limit is given.
 pub fn check_memory(needed: u64, limit: Option<u64>, [width, height]: [u32; 2]) -> Result<(), Failure> {
-    let allowed = limit.or_else(free_memory).unwrap_or(16_000_000_000);
+    let allowed = allowed_memory(limit);
     if needed <= allowed {
         return Ok(());
     }
@@ -81,6 +86,11 @@ pub fn check_memory(needed: u64, limit: Option<u64>, [width, height]: [u32; 2]) 
             show_bytes(allowed)
         ),
     })
+}
+
+/// The limit if there is one, else what the machine has free.
+pub fn allowed_memory(limit: Option<u64>) -> u64 {
+    limit.or_else(free_memory).unwrap_or(16_000_000_000)
 }
 
 /// Free memory in bytes, where the system tells it: the smaller of the machine's and the control
@@ -98,7 +108,7 @@ fn free_memory() -> Option<u64> {
 }
 
 /// A file can be made beside `path`, which is not a directory.
-fn check_directory(path: &Path) -> Result<(), String> {
+pub(super) fn check_directory(path: &Path) -> Result<(), String> {
     if path.is_dir() {
         return Err("is a directory".into());
     }

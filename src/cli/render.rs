@@ -5,7 +5,7 @@ use super::open::{self, Described, Opened};
 use super::output::{self, Outputs};
 use super::progress::ProgressLine;
 use super::units::{show_count, show_duration};
-use super::{Exit, Failure, interrupt, tell};
+use super::{Exit, Failure, elements, interrupt, tell};
 use crate::io::write::write_atomic;
 use crate::render::{Budget, Control, Estimator, Options, Outcome, Render};
 use crate::scene::Scene;
@@ -24,6 +24,9 @@ const DEFAULT_SPP: u64 = 64;
 
 /// Renders and writes.
 pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
+    if let Some(method) = elements::method(args) {
+        return elements::run(args, command, method);
+    }
     let start = Instant::now();
     let outputs = Outputs::check(args)?;
     let paths = args.transport.paths.as_deref().map(PathFilter::parse).transpose();
@@ -50,7 +53,7 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
 }
 
 /// Size, crop window and memory of the film of the chosen sensor.
-fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(), Failure> {
+pub(super) fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(), Failure> {
     let Some(sensor) = described.description.sensors.get_mut(described.sensor) else {
         return Err(Failure::usage("the scene has no sensor"));
     };
@@ -74,7 +77,7 @@ fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(), Failure>
         film.crop = Some([x, y, w, h]);
     }
     let [_, _, width, height] = film.crop.unwrap_or([0, 0, film.width, film.height]);
-    let shoots = args.estimator != EstimatorName::Gather;
+    let shoots = args.estimator != EstimatorName::Gather && elements::method(args).is_none();
     let needed = output::memory_needed(width, height, args.transport.light_paths, shoots);
     output::check_memory(needed, args.max_memory, [width, height])
 }
@@ -82,7 +85,8 @@ fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(), Failure>
 /// The estimator and all that it is told.
 fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     let estimator = match args.estimator {
-        EstimatorName::Gather => Estimator::Gather,
+        // Those of finite elements have no walks and do not come here.
+        EstimatorName::Gather | EstimatorName::Invert | EstimatorName::Iterate => Estimator::Gather,
         EstimatorName::Shoot => Estimator::Shoot,
         EstimatorName::Bidirectional => Estimator::Bidirectional,
         EstimatorName::Scene => Estimator::of_integrator(&opened.description.integrator.name),
@@ -116,6 +120,16 @@ fn budget(scene: &Scene, args: &RenderArgs) -> Budget {
     let of_scene = || scene.sample_count.map_or(DEFAULT_SPP, u64::from);
     let passes = if args.time.is_some() { args.spp } else { Some(args.spp.unwrap_or_else(of_scene)) };
     Budget { passes, time: args.time }
+}
+
+/// A command as it could be typed again.
+pub(super) fn command_line(command: &[OsString]) -> String {
+    let quoted = command.iter().map(|a| {
+        let a = a.to_string_lossy();
+        let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
+        if !a.is_empty() && a.chars().all(plain) { a.into_owned() } else { format!("'{}'", a.replace('\'', r"'\''")) }
+    });
+    quoted.collect::<Vec<_>>().join(" ")
 }
 
 /// Everything that stays the same while a render runs.
@@ -234,14 +248,8 @@ impl Job<'_> {
         entries.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
     }
 
-    /// The command as it could be typed again.
     fn command_line(&self) -> String {
-        let quoted = self.command.iter().map(|a| {
-            let a = a.to_string_lossy();
-            let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
-            if !a.is_empty() && a.chars().all(plain) { a.into_owned() } else { format!("'{}'", a.replace('\'', r"'\''")) }
-        });
-        quoted.collect::<Vec<_>>().join(" ")
+        command_line(self.command)
     }
 
     fn figures(&self, render: &Render, scene: &Scene) -> serde_json::Value {

@@ -11,6 +11,9 @@
 
 mod body;
 mod header;
+mod write;
+
+pub use write::write;
 
 use super::fault::{Decoded, Fault, escape};
 use super::mesh::{RawMesh, bad_index, fits};

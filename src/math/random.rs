@@ -24,6 +24,8 @@ pub enum Family {
     Pilot = 3,
     /// Anything else (tests, tools).
     Other = 4,
+    /// Rays of finite elements, indexed by element or ray.
+    Elements = 5,
 }
 
 /// Mixes 64 bits so that every input bit reaches every output bit (finaliser of SplitMix64).

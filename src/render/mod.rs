@@ -16,11 +16,13 @@
 //! ```
 
 mod estimator;
+mod known;
 mod measure;
 mod passes;
 mod pilot;
 
 pub use estimator::{Estimator, Options};
+pub use known::film_of;
 pub use measure::{Measurement, PixelMeasurement, measure};
 pub use passes::SHOOT_JOB;
 

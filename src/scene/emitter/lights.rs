@@ -33,6 +33,25 @@ impl Lights {
     pub fn sample_next_event(&self, geometry: &Geometry, guide: &Guide, x: Vec3, u_pick: f32, u: Vec2) -> Option<NextEvent> {
         let choice = self.choice.as_ref()?;
         let (i, prob, _) = choice.next_event.sample(u_pick);
+        self.next_event_from(geometry, guide, x, (i, prob), u)
+    }
+
+    /// The same from one emitter, of which ν is then the density without any choice.
+    pub fn next_event_of(&self, emitter: EmitterId, geometry: &Geometry, guide: &Guide, x: Vec3, u: Vec2) -> Option<NextEvent> {
+        let (_, i) = self.chosen(emitter)?;
+        self.next_event_from(geometry, guide, x, (i, 1.0), u)
+    }
+
+    /// A light point of emitter `i`, which was chosen with probability `prob`.
+    #[inline]
+    fn next_event_from(
+        &self,
+        geometry: &Geometry,
+        guide: &Guide,
+        x: Vec3,
+        (i, prob): (usize, f32),
+        u: Vec2,
+    ) -> Option<NextEvent> {
         let emitter = EmitterId(i as u32);
         match &self.emitters[i] {
             Emitter::Area(area) => {
@@ -99,13 +118,18 @@ impl Lights {
     #[inline]
     pub fn density_next_event(&self, geometry: &Geometry, x: Vec3, point: &EmitterPoint, w: Vec3) -> f32 {
         let Some((choice, i)) = self.chosen(point.emitter) else { return 0.0 };
-        let p = match &self.emitters[i] {
-            Emitter::Area(area) => geometry.density_toward(area.shape, x, point.y, point.n_g),
-            Emitter::Sky(sky) => sky.density(w),
-            Emitter::Point(_) | Emitter::Spot(_) | Emitter::Parallel(_) => 1.0,
-            Emitter::Dark => return 0.0,
-        };
-        choice.next_event.prob(i) * p
+        choice.next_event.prob(i) * self.density_of(geometry, x, point, w)
+    }
+
+    /// The same without the choice of the emitter, as of [`Self::next_event_of`].
+    #[inline]
+    pub fn density_of(&self, geometry: &Geometry, x: Vec3, point: &EmitterPoint, w: Vec3) -> f32 {
+        match self.emitters.get(point.emitter.0 as usize) {
+            Some(Emitter::Area(area)) => geometry.density_toward(area.shape, x, point.y, point.n_g),
+            Some(Emitter::Sky(sky)) => sky.density(w),
+            Some(Emitter::Point(_) | Emitter::Spot(_) | Emitter::Parallel(_)) => 1.0,
+            Some(Emitter::Dark) | None => 0.0,
+        }
     }
 
     /// A light point and a direction of travel from it, with the flux they stand for.

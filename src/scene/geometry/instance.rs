@@ -38,6 +38,15 @@ impl Instance {
         it
     }
 
+    /// Keeps angles, as far as single precision can say.
+    pub(super) fn is_similarity(&self) -> bool {
+        let [x, y, z] = [self.to_world.matrix3.x_axis, self.to_world.matrix3.y_axis, self.to_world.matrix3.z_axis];
+        let most = x.length_squared().max(y.length_squared()).max(z.length_squared());
+        let right = |a: Vec3A, b: Vec3A| a.dot(b).abs() < 1e-4 * most;
+        let equal = |a: Vec3A| most - a.length_squared() < 2e-4 * most;
+        right(x, y) && right(y, z) && right(z, x) && equal(x) && equal(y) && equal(z)
+    }
+
     /// A ray of the world in the group's coordinates, ending at `t_max`.
     #[inline]
     pub(super) fn ray_to_group(&self, ray: &Ray, t_max: f32) -> Ray {

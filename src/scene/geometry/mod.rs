@@ -19,6 +19,7 @@ mod lanes;
 mod lanes_avx2;
 mod meshes;
 mod pages;
+mod pieces;
 mod ray;
 mod sample;
 mod sphere;
@@ -34,6 +35,7 @@ mod tree;
 mod triangle;
 
 pub use input::{Form, ShapeInput};
+pub use pieces::{Piece, Pieces};
 pub use ray::{Aabb, Hit, Ray};
 pub use sample::ShapePoint;
 pub use surface::offset_origin;
@@ -60,6 +62,10 @@ pub struct Geometry {
     vertices: Pages<Vertex>,
     shapes: Vec<Shape>,
     samplers: Vec<(Sampler, f64)>,
+    /// Primitives up to `ends[0]` are the scene's, up to `ends[i]` those of group i − 1.
+    ends: Vec<usize>,
+    /// Group of every instance.
+    placed_groups: Vec<u32>,
     bounds: Aabb,
     triangles: usize,
     warnings: Problems,
@@ -126,6 +132,8 @@ impl Geometry {
             vertices: Pages::new(&baked.vertices),
             shapes: baked.shapes,
             samplers: baked.samplers,
+            ends: ends.to_vec(),
+            placed_groups: baked.placed.iter().map(|(group, _)| *group).collect(),
             bounds,
             warnings: baked.problems,
         }

@@ -81,6 +81,11 @@ impl Sphere {
         self.point(sphere_uniform(u).as_dvec3().normalize())
     }
 
+    /// The point in direction `own` (unit) from the centre, in the sphere's own coordinates.
+    pub(super) fn at(&self, own: DVec3) -> (DVec3, DVec3, Vec2) {
+        self.point((self.linear * own / self.radius).normalize())
+    }
+
     fn point(&self, out: DVec3) -> (DVec3, DVec3, Vec2) {
         (self.center + out * self.radius, out * self.side, uv(self.own(out)))
     }
