@@ -312,3 +312,59 @@ fn an_interrupt_keeps_the_image() {
         assert!(read_image(&output).is_ok_and(|i| i.width == 24));
     }
 }
+
+/// A closed box of albedo ½ lit by itself, and a glass ball in it if asked.
+const DIFFUSE: &str = r#"<scene version="3.0.0">
+    <default name="ball" value="diffuse"/>
+    <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="18"/></film></sensor>
+    <shape type="cube"><boolean name="flip_normals" value="true"/><bsdf type="diffuse"/>
+        <emitter type="area"><rgb name="radiance" value="0.5"/></emitter></shape>
+    <shape type="sphere"><float name="radius" value="0.3"/><point name="center" value="0, 0, 0.5"/><bsdf type="$ball"/></shape>
+</scene>
+"#;
+
+#[test]
+fn finite_elements_make_images_and_meshes() {
+    let room = Room::new();
+    std::fs::write(room.path("box.xml"), DIFFUSE).unwrap();
+    let with = |more: &[&str]| {
+        let mut command = nephroid();
+        command.current_dir(room.directory.path()).args(["render", "box.xml", "--elements", "200", "--element-rays", "128"]);
+        run(command.args(more))
+    };
+    let methods = ["jacobi", "gauss-seidel", "southwell", "stochastic"];
+    for method in methods {
+        let (code, _, talk) = with(&["-e", "iterate", "--iteration", method, "-o", "a.exr", "--residual-log", "log.csv"]);
+        assert!(code == 0 && talk.contains("at most"), "{talk}");
+        let log = std::fs::read_to_string(room.path("log.csv")).unwrap();
+        assert!(log.lines().count() > 3, "{log}");
+    }
+    let (code, _, talk) = with(&["-e", "invert", "-o", "a.exr", "-o", "a.ply", "--stats", "a.json", "--element-view", "flat"]);
+    assert_eq!(code, 0, "{talk}");
+    let image = read_image(&room.path("a.exr")).unwrap().rgb("").unwrap();
+    // The ball does not shine, the walls are near 1.
+    assert!(image.iter().all(|p| p[0] > 0.3 && p[0] < 1.0), "{image:?}");
+    let mesh = nephroid::io::ply::parse(&std::fs::read(room.path("a.ply")).unwrap(), false).unwrap().value;
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(room.path("a.json")).unwrap()).unwrap();
+    assert!(mesh.triangles.len() as u64 >= stats["elements"].as_u64().unwrap());
+    assert!(stats["relative_error_bound"].as_f64().unwrap() < 0.2, "{stats}");
+}
+
+#[test]
+fn finite_elements_refuse_what_they_cannot_do() {
+    let room = Room::new();
+    std::fs::write(room.path("box.xml"), DIFFUSE).unwrap();
+    let with = |more: &[&str]| {
+        let mut command = nephroid();
+        run(command.current_dir(room.directory.path()).args(["render", "box.xml", "-e", "invert", "-o", "a.png"]).args(more))
+    };
+    for (arguments, words) in [
+        (&["-D", "ball=dielectric"][..], &["is `dielectric`", "box.xml:6:", "diffuse models only"][..]),
+        (&["--max-memory", "100MB", "--elements", "30000"], &["30000 elements need", "100 MB", "stochastic"]),
+        (&["--paths", "E D L"], &["--paths is about walks"]),
+    ] {
+        let (code, _, talk) = with(arguments);
+        assert!(code == 2 && words.iter().all(|w| talk.contains(w)), "{arguments:?}: {talk}");
+        assert!(!room.path("a.png").exists());
+    }
+}

@@ -201,8 +201,11 @@ impl Job<'_> {
     fn solve(&mut self) -> Result<Solved, Failure> {
         let scene = &self.opened.scene;
         let before = Instant::now();
+        self.check_memory(self.args.elements.count as usize)?;
         let mesh = self.mesh()?;
         let n = mesh.len();
+        self.check_memory(n)?;
+        self.check_interrupt()?;
         self.figure("elements", n);
         self.talk(&format!("estimator {}: {n} elements in {}\n", self.method.name(), show_duration(before.elapsed())));
         let smooth = mesh.smooth_shapes().len();
@@ -216,6 +219,29 @@ impl Job<'_> {
             _ => self.with_matrix(&mesh, &sources)?,
         };
         Ok(Solved { mesh, sources, radiance })
+    }
+
+    /// Refuses a matrix beyond the limit, before and after it is known how many elements there are.
+    fn check_memory(&self, elements: usize) -> Result<(), Failure> {
+        let matrix = match self.method {
+            Method::Stochastic => return Ok(()),
+            Method::Invert => invert::bytes(elements),
+            Method::Iterate(_) => 0,
+        };
+        let needed = Factors::bytes(elements, self.args.elements.element_rays).saturating_add(matrix);
+        let allowed = output::allowed_memory(self.args.max_memory);
+        if needed > allowed {
+            return Err(self.failure(&ElementsError::Memory { elements, needed, allowed }));
+        }
+        Ok(())
+    }
+
+    /// Refuses to go on where somebody asked to stop and there is no solution yet.
+    fn check_interrupt(&self) -> Result<(), Failure> {
+        if interrupt::asked() {
+            return Err(Failure { exit: Exit::Interrupted, message: "interrupted before there was a solution\n".into() });
+        }
+        Ok(())
     }
 
     fn mesh(&self) -> Result<Elements, Failure> {
@@ -232,15 +258,10 @@ impl Job<'_> {
     }
 
     fn with_matrix(&mut self, mesh: &Elements, sources: &Sources) -> Result<Vec<Rgb>, Failure> {
-        let (n, rays) = (mesh.len(), self.args.elements.element_rays);
-        let allowed = output::allowed_memory(self.args.max_memory);
-        let matrix = if self.method == Method::Invert { invert::bytes(n) } else { 0 };
-        let needed = Factors::bytes(n, rays).saturating_add(matrix);
-        if needed > allowed {
-            return Err(self.failure(&ElementsError::Memory { elements: n, needed, allowed }));
-        }
+        let rays = self.args.elements.element_rays;
         let before = Instant::now();
         let factors = Factors::cast(&self.opened.scene, mesh, &ray_counts(mesh, sources, rays), self.seed());
+        self.check_interrupt()?;
         let [open, closed] = factors.closure_error;
         self.talk(&format!(
             "{} form factors by {} rays in {}; closure off by {:.2} % at most, after scaling by {closed:.1e}\n",
@@ -256,7 +277,10 @@ impl Job<'_> {
         let before = Instant::now();
         let radiance = match self.method {
             Method::Iterate(how) => self.iterate(&factors, sources, how),
-            _ => invert::invert(&factors, sources, allowed).map_err(|e| self.failure(&e))?,
+            _ => {
+                let allowed = output::allowed_memory(self.args.max_memory);
+                invert::invert(&factors, sources, allowed).map_err(|e| self.failure(&e))?
+            }
         };
         self.figure("solve_seconds", before.elapsed().as_secs_f64());
         self.talk(&format!("solved in {}\n", show_duration(before.elapsed())));

@@ -1,11 +1,11 @@
 //! The bound of the error [theory A15]: above the measured error, and not far above.
 
-use crate::support::{box_with_blocks, scene};
+use crate::support::{box_with_blocks, scene, six_walls, slope};
 use glam::{Mat4, Vec2, Vec3};
 use nephroid::describe::{FilmDescription, FilterDescription, FovAxis, Place, Problems, SensorDescription, SensorModel};
 use nephroid::elements::bound::bound;
 use nephroid::elements::factors::ray_counts;
-use nephroid::elements::{Elements, Factors, Rgb, Sources, View, invert::invert, view};
+use nephroid::elements::{Elements, Factors, Rgb, Sources, Subdivision, View, invert::invert, subdivide, view};
 use nephroid::glam;
 use nephroid::math::random::Family;
 use nephroid::math::{Frame, Random};
@@ -19,7 +19,10 @@ use nephroid::transport::walk::{Context, Tally};
 use nephroid::transport::{Contribution, RayCounts, Record};
 
 fn solve(world: &Scene, elements: usize, rays: u32) -> (Elements, Sources, Vec<Rgb>) {
-    let mesh = Elements::new(world, elements).unwrap();
+    solve_on(world, Elements::new(world, elements).unwrap(), rays)
+}
+
+fn solve_on(world: &Scene, mesh: Elements, rays: u32) -> (Elements, Sources, Vec<Rgb>) {
     let sources = Sources::new(world, &mesh, 16, 1);
     let factors = Factors::cast(world, &mesh, &ray_counts(&mesh, &sources, rays), 1);
     let radiance = invert(&factors, &sources, u64::MAX).unwrap();
@@ -136,6 +139,38 @@ fn a15_a17_sphere_within_the_bound() {
         assert!(measured <= error && error <= 20.0 * measured, "{elements}: {measured} {error}");
         errors.push((elements as f64, measured));
     }
-    let order = crate::support::slope(&errors);
+    let order = slope(&errors);
     assert!((-0.35..-0.15).contains(&order), "order {order} in the number of elements: {errors:?}");
+}
+
+/// One glowing wall of a cube, radiance smooth on the others but for its gradient, which is logarithmic at
+/// the edges of that wall: the error of constant elements falls as their diameter h times √ln(1/h), a
+/// little more slowly than n^-1/2 in their number.
+#[test]
+fn a15_error_falls_with_the_diameter_of_elements() {
+    let world = scene(&six_walls(|i| if i == 0 { ("0.5", "1") } else { ("0.5", "") }));
+    let errors: Vec<(f64, f64)> = [48usize, 192, 768]
+        .map(|n| {
+            let (mesh, _, radiance) = solve(&world, n, 4096);
+            (n as f64, bound(&world, &mesh, &radiance, 8192, 32, 1).residual)
+        })
+        .into();
+    let order = slope(&errors);
+    println!("order {order}: {errors:?}");
+    assert!((-0.55..-0.4).contains(&order), "order {order} in the number of elements: {errors:?}");
+}
+
+/// Elements put where radiance varies do better than as many of one size.
+#[test]
+fn a15_adaptive_elements_are_better() {
+    let world = scene(&box_with_blocks());
+    let (mesh, _, radiance) = solve(&world, 1200, 2048);
+    let uniform = bound(&world, &mesh, &radiance, 4096, 32, 1).residual;
+    let how = Subdivision { elements: 1200, error: None, source_samples: 1, seed: 1 };
+    let (mesh, _, radiance) = solve_on(&world, subdivide(&world, &how).unwrap(), 2048);
+    let adaptive = bound(&world, &mesh, &radiance, 4096, 32, 1).residual;
+    println!("uniform {uniform:.4}, adaptive {adaptive:.4}");
+    assert!(mesh.len() <= 1200 && adaptive < 0.9 * uniform, "{} elements: {adaptive}, uniform {uniform}", mesh.len());
+    let coarse = subdivide(&world, &Subdivision { error: Some(0.2), ..how }).unwrap();
+    assert!(coarse.len() < mesh.len(), "{} elements for a fifth", coarse.len());
 }
