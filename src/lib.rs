@@ -17,6 +17,7 @@
 //! - [`elements`]: the rendering equation of diffuse scenes as a finite system of equations.
 //! - [`io`]: one file per format.
 //! - [`report`]: comparison of images.
+//! - [`proof`]: statements of the theory, tested on a scene.
 //! - [`cli`]: the command line.
 //!
 //! ```no_run
@@ -41,6 +42,7 @@ pub mod film;
 pub mod io;
 pub mod local;
 pub mod math;
+pub mod proof;
 pub mod render;
 pub mod report;
 pub mod scene;

@@ -10,11 +10,15 @@ mod scenes;
 #[allow(dead_code)]
 mod support;
 
+use nephroid::proof::adjoint::{ALPHA, Effort as Draws, adjoint};
 use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
 use nephroid::transport::settings::{Settings, Techniques};
 use support::{Effort, scene, seed, series};
+
+/// A mistake is planted for the whole process.
+static ONE_AT_A_TIME: std::sync::Mutex<()> = std::sync::Mutex::new(());
 
 /// A comparison of two estimates of the same thing.
 struct Check {
@@ -101,6 +105,7 @@ fn p_of(check: &Check) -> f64 {
 
 #[test]
 fn planted_mistakes_are_caught() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
     for check in &CHECKS {
         plant(None);
         let sound = p_of(check);
@@ -110,5 +115,33 @@ fn planted_mistakes_are_caught() {
         println!("{:?}: p = {sound:.2e} without, {mistaken:.2e} with the mistake ({})", check.mutant, check.named);
         assert!(sound > 1e-5, "{:?}: the sound estimators disagree, p = {sound:.2e}", check.mutant);
         assert!(mistaken < 1e-5, "{:?}: {} does not notice, p = {mistaken:.2e}", check.mutant, check.named);
+    }
+}
+
+/// The command `adjoint` notices a mistake in either walker.
+#[test]
+fn planted_mistakes_part_the_walkers() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    for (mutant, name, passes) in [
+        (Mutant::AdjointShadingNormal, "shading normals", 6),
+        (Mutant::RefractionEtaSquared, "under water", 6),
+        (Mutant::SplatCropNormalisation, "crop window", 2),
+        (Mutant::NextEventDensity, "diffuse box", 2),
+        (Mutant::RouletteFactor, "diffuse box", 24),
+        (Mutant::AreaCosine, "diffuse box", 2),
+    ] {
+        let world = scene(&scenes::named(dir.path(), name));
+        let max_length = Some(if mutant == Mutant::RouletteFactor { 9 } else { 5 });
+        let draws = Draws { passes: Some(passes), seed: seed(), max_length, ..Draws::default() };
+        let [sound, mistaken] = [None, Some(mutant)].map(|m| {
+            plant(m);
+            let found = adjoint(&world, &draws).unwrap();
+            plant(None);
+            found
+        });
+        println!("{mutant:?}: p = {:.2e} without, {:.2e} with the mistake", sound.p, mistaken.p);
+        assert!(sound.agree && sound.p >= ALPHA, "{mutant:?}:\n{}", sound.to_text(true, false));
+        assert!(!mistaken.agree, "{mutant:?}:\n{}", mistaken.to_text(true, false));
     }
 }

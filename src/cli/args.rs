@@ -17,7 +17,7 @@ pub struct Cli {
 }
 
 const EXIT_CODES: &str = "\
-Exit codes: 0 done; 1 no (images differ); 2 usage or scene error; 4 output error;
+Exit codes: 0 done; 1 no (images differ, a test fails); 2 usage or scene error; 4 output error;
 130 interrupted, with the image so far written.
 Data goes to standard output, everything else to standard error.";
 
@@ -32,6 +32,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Say how an image differs from a reference.
     Compare(CompareArgs),
+    /// Test on a scene that both equations measure the same, for every number of scatterings.
+    Adjoint(AdjointArgs),
 }
 
 /// How to read a scene.
@@ -284,4 +286,50 @@ fn positive(text: &str) -> Result<f64, String> {
 
 fn finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0).ok_or_else(|| "expected a number of at least 0".into())
+}
+
+/// How to compare both walkers.
+#[derive(Clone, Debug, Args)]
+pub struct AdjointArgs {
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// How much.
+    #[command(flatten)]
+    pub effort: ProofArgs,
+    /// Only paths of a class, such as 'E D S+ L', of those that both walkers can make.
+    #[arg(long, value_name = "EXPR")]
+    pub paths: Option<String>,
+    /// Longest path in edges [default: the scene's max_depth, or 16].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub max_length: Option<u32>,
+    /// Size of the film [default: the scene's, at most 96 pixels a side].
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    pub size: Option<[u32; 2]>,
+    /// Every class of paths by the events beside eye and light (D wide, G narrow, S Dirac).
+    #[arg(long)]
+    pub classes: bool,
+    /// The test of every block.
+    #[arg(long)]
+    pub blocks: bool,
+}
+
+/// How much a statistical test does.
+#[derive(Clone, Debug, Args)]
+pub struct ProofArgs {
+    /// Independent draws of each side.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=10_000))]
+    pub renders: u32,
+    /// Passes per draw [default: as many as the test needs, within --time].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub passes: Option<u64>,
+    /// Time after which no passes are added [default: 60s].
+    #[arg(long, value_name = "TIME", value_parser = units::duration, conflicts_with = "passes")]
+    pub time: Option<Duration>,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// As JSON.
+    #[arg(long)]
+    pub json: bool,
 }

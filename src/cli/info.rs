@@ -5,7 +5,7 @@ use super::units::show_bytes;
 use super::{Exit, Failure, open, say, tell};
 use crate::describe::{SceneDescription, SensorDescription, SensorModel, ShapeDescription, ShapeModel};
 use crate::film::Film;
-use crate::report::coverage::{Blind, blind_spots};
+use crate::report::coverage::Coverage;
 use crate::scene::SceneInfo;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -27,7 +27,7 @@ pub fn run(args: &InfoArgs) -> Result<Exit, Failure> {
         sensors: description.sensors.len(),
         integrator: &description.integrator.name,
         textures: description.images.len(),
-        blind: blind_spots(description),
+        coverage: Coverage::of(&opened.scene),
     };
     say(&if args.json { inventory.to_json() } else { inventory.to_text() });
     Ok(Exit::Done)
@@ -41,7 +41,7 @@ struct Inventory<'a> {
     sensors: usize,
     integrator: &'a str,
     textures: usize,
-    blind: Vec<Blind>,
+    coverage: Coverage,
 }
 
 /// Shapes at top level and in groups, by kind.
@@ -112,12 +112,7 @@ impl Inventory<'_> {
             show_bytes(s.image_bytes as u64),
             show_bytes(self.film_bytes())
         );
-        if self.blind.is_empty() {
-            out.push_str("coverage    every estimator makes every path\n");
-        }
-        for b in &self.blind {
-            let _ = writeln!(out, "not seen    by {}: {} (paths {})", b.estimator, b.what, b.paths);
-        }
+        out.push_str(&self.coverage.to_text());
         let _ = writeln!(out, "hash        {}", self.hash);
         out
     }
@@ -171,7 +166,9 @@ impl Inventory<'_> {
             "emitter_bytes": s.emitter_bytes,
             "image_bytes": s.image_bytes,
             "film_bytes": self.film_bytes(),
-            "not_seen": self.blind,
+            "coverage": self.coverage.rows,
+            "not_seen": self.coverage.blind,
+            "dark_for_shooting": self.coverage.dark_for_shooting,
         });
         serde_json::to_string_pretty(&value).unwrap_or_default() + "\n"
     }

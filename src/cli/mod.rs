@@ -7,7 +7,7 @@
 //! - [`open`]: a scene file into a built scene.
 //! - [`render`], [`output`], [`progress`], [`interrupt`]: rendering.
 //! - [`elements`]: rendering by finite elements.
-//! - [`info`], [`compare`]: the other subcommands.
+//! - [`info`], [`compare`], [`proof`]: the other subcommands.
 
 pub mod args;
 pub mod compare;
@@ -17,6 +17,7 @@ pub mod interrupt;
 pub mod open;
 pub mod output;
 pub mod progress;
+pub mod proof;
 pub mod render;
 pub mod units;
 
@@ -80,6 +81,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Check(args) => open::check(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Adjoint(args) => proof::adjoint(args),
     };
     ExitCode::from(match outcome {
         Ok(exit) => exit as u8,

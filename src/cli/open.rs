@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::{Exit, Failure, tell};
-use crate::describe::{Problems, SceneDescription, SensorDescription, Sources};
+use crate::describe::{FilmDescription, Problems, SceneDescription, SensorDescription, Sources};
 use crate::io::assets;
 use crate::io::mitsuba::{self, LoadOptions};
 use crate::scene::Scene;
@@ -71,6 +71,17 @@ pub fn build(described: Described) -> Result<Opened, Failure> {
             Err(scene_failure(&problems, &description.sources))
         }
     }
+}
+
+/// The same part of the picture at another size.
+pub fn resize(film: &mut FilmDescription, [width, height]: [u32; 2]) {
+    let scale = |v: u32, from: u32, to: u32| (u64::from(v) * u64::from(to) / u64::from(from.max(1))) as u32;
+    film.crop = film.crop.map(|[x, y, w, h]| {
+        let (left, top) = (scale(x, film.width, width), scale(y, film.height, height));
+        let (right, bottom) = (scale(x + w, film.width, width), scale(y + h, film.height, height));
+        [left, top, (right - left).max(1), (bottom - top).max(1)]
+    });
+    (film.width, film.height) = (width, height);
 }
 
 /// Threads for everything that follows; `None` leaves it to the machine.

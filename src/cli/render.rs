@@ -58,15 +58,8 @@ pub(super) fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(
         return Err(Failure::usage("the scene has no sensor"));
     };
     let film = &mut sensor.film;
-    if let Some([width, height]) = args.size {
-        // The same part of the picture at another size.
-        let scale = |v: u32, from: u32, to: u32| (u64::from(v) * u64::from(to) / u64::from(from.max(1))) as u32;
-        film.crop = film.crop.map(|[x, y, w, h]| {
-            let (left, top) = (scale(x, film.width, width), scale(y, film.height, height));
-            let (right, bottom) = (scale(x + w, film.width, width), scale(y + h, film.height, height));
-            [left, top, (right - left).max(1), (bottom - top).max(1)]
-        });
-        (film.width, film.height) = (width, height);
+    if let Some(size) = args.size {
+        open::resize(film, size);
     }
     if let Some([x, y, w, h]) = args.crop {
         let inside = |from: u32, size: u32, all: u32| from.checked_add(size).is_some_and(|end| end <= all);

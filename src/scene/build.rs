@@ -54,6 +54,7 @@ impl Scene {
         }
         let built_sensor = chosen.and_then(|s| Sensor::build(s, &mut problems));
         let shapes = Shapes::gather(description, materials.as_ref(), &mut problems);
+        let used_materials = shapes.materials();
         let geometry = keep(Geometry::build(shapes.top, shapes.groups), &mut problems);
         // Without geometry the emitters are still checked, against nothing.
         let empty = if geometry.is_none() { Geometry::build(vec![], vec![]).ok() } else { None };
@@ -79,6 +80,7 @@ impl Scene {
             integrator: description.integrator.clone(),
             sample_count: chosen.sample_count,
             seed: chosen.seed,
+            used_materials,
             hash: content_hash(description, chosen),
             image_bytes: description.images.iter().map(image_bytes).sum(),
         };
@@ -124,6 +126,15 @@ struct Shapes<'a> {
 }
 
 impl<'a> Shapes<'a> {
+    /// Local models of all that has a surface, in order.
+    fn materials(&self) -> Vec<MaterialId> {
+        let all = self.top.iter().chain(self.groups.iter().flatten());
+        let mut ids: Vec<u32> = all.filter(|s| !matches!(s.form, Form::Instance { .. })).map(|s| s.material.0).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids.into_iter().map(MaterialId).collect()
+    }
+
     /// All shapes; those that refer to what does not exist are reported and left out.
     fn gather(description: &'a SceneDescription, materials: Option<&Materials>, problems: &mut Problems) -> Self {
         let mut shapes = Self::default();

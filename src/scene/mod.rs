@@ -41,6 +41,8 @@ pub struct Scene {
     pub sample_count: Option<u32>,
     /// Seed that the scene asks for.
     pub seed: u64,
+    /// Local models that some shape has, each once.
+    pub used_materials: Vec<MaterialId>,
     hash: [u8; 32],
     image_bytes: usize,
 }

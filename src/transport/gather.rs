@@ -14,6 +14,7 @@ use crate::local::Equation;
 use crate::math::Random;
 use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::Ray;
+use crate::scene::sensor::SensorRay;
 use crate::scene::{EmitterId, Surface};
 use crate::spectrum::Spectrum;
 use glam::{Vec2, Vec3};
@@ -30,8 +31,22 @@ pub fn gather<R: Record, O: Observe>(
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
+    let start = cx.scene.sensor.sample_ray(raster, random.unit2());
+    follow(cx, start, weight, lights, random, tally);
+}
+
+/// The same along a given ray: with hits and next events alone it may start anywhere, and estimates
+/// `weight` times the radiance that arrives along it.
+#[inline]
+pub fn follow<R: Record, O: Observe>(
+    cx: Context<'_>,
+    start: SensorRay,
+    weight: f32,
+    lights: &LightCache,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
     let (scene, plan) = (cx.scene, cx.plan);
-    let start = scene.sensor.sample_ray(raster, random.unit2());
     tally.rays.gather_walks += 1;
     tally.observe.started(start.lens, None);
     let mut ray = Ray { o: start.o, d: start.d, t_max: start.t_max };

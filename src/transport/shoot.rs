@@ -11,6 +11,7 @@ use super::walk::{Context, Join, Observe, Tally, Walk, end, free, spawn};
 use super::{Contribution, Record, Technique};
 use crate::local::Equation;
 use crate::math::Random;
+use crate::scene::emitter::Emission;
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::scene::sensor::SensorConnection;
 use crate::spectrum::Spectrum;
@@ -21,18 +22,35 @@ const EQUATION: Equation = Equation::Potential;
 /// One light path; its vertices are appended to `cache` where connections want them.
 pub fn shoot<R: Record, O: Observe>(
     cx: Context<'_>,
+    cache: Option<&mut Vec<LightVertex>>,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    if plan.splat_emitters && plan.wants_length(1) {
+        splat_emitter(cx, random, tally);
+    }
+    let (u_pick, u_position, u_direction) = (random.unit(), random.unit2(), random.unit2());
+    let Some(start) = scene.lights.sample_emission(&scene.geometry, &plan.guide, u_pick, u_position, u_direction) else {
+        tally.rays.shoot_walks += 1;
+        return;
+    };
+    emit(cx, &start, cache, random, tally);
+}
+
+/// The same from a given start: with splats alone it may be anywhere, and estimates the potential of
+/// its direction times its weight.
+#[inline]
+pub fn emit<R: Record, O: Observe>(
+    cx: Context<'_>,
+    start: &Emission,
     mut cache: Option<&mut Vec<LightVertex>>,
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
     let (scene, plan) = (cx.scene, cx.plan);
     tally.rays.shoot_walks += 1;
-    if plan.splat_emitters && plan.wants_length(1) {
-        splat_emitter(cx, random, tally);
-    }
-    let (u_pick, u_position, u_direction) = (random.unit(), random.unit2(), random.unit2());
-    let Some(start) = scene.lights.sample_emission(&scene.geometry, &plan.guide, u_pick, u_position, u_direction) else { return };
-    tally.observe.started(start.point.y, Some(&start));
+    tally.observe.started(start.point.y, Some(start));
     let h = plan.settings.heuristic;
     let d = &start.density;
     let hits = plan.settings.techniques.hit && !start.delta;

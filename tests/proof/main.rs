@@ -1,0 +1,10 @@
+//! Statements of the theory by the commands that prove them: adjointness, coverage, residuals, closed
+//! forms. docs/theory.md says which test holds which statement.
+
+mod adjoint;
+#[path = "../physics/scenes.rs"]
+#[allow(dead_code)]
+mod scenes;
+#[path = "../physics/support.rs"]
+#[allow(dead_code)]
+mod support;
