@@ -368,3 +368,40 @@ fn finite_elements_refuse_what_they_cannot_do() {
         assert!(!room.path("a.png").exists());
     }
 }
+
+#[test]
+fn layers_and_gallery_of_one_render() {
+    let room = Room::new();
+    let (image, gallery) = (room.path("a.exr"), room.path("terms.png"));
+    let mut command = nephroid();
+    command.arg("render").arg(room.scene()).args(["--layers=2", "-o"]).arg(&image).arg("--gallery").arg(&gallery);
+    let (code, _, err) = run(&mut command);
+    assert_eq!(code, 0, "{err}");
+    let file = read_image(&image).expect("an image");
+    let whole = file.rgb("").expect("the beauty");
+    // Paths have at most 4 edges, so that n = 2 has n = 3 beyond it.
+    let terms: Vec<_> = ["n0", "n1", "n2+"].iter().map(|n| file.rgb(n).expect("a term")).collect();
+    for (i, p) in whole.iter().enumerate() {
+        let sum: f32 = terms.iter().map(|t| t[i][1]).sum();
+        assert!((sum - p[1]).abs() <= 1e-6 * p[1].max(1e-3), "pixel {i}: {sum} instead of {}", p[1]);
+    }
+    let sheet = image::open(&gallery).expect("a sheet").into_rgb8();
+    assert!(sheet.width() > 3 * 160 && sheet.height() > 2 * 100, "{:?}", sheet.dimensions());
+    assert!(sheet.pixels().any(|p| p.0.iter().all(|v| *v > 200)), "labels are bright");
+    let wrong = [vec!["-o", "b.png", "--layers"], vec!["-o", "b.exr", "--layers=999"], vec!["-o", "b.exr", "--gallery", "g.exr"]];
+    for wrong in wrong.into_iter().chain([vec!["-o", "b.exr", "--layers", "--estimator", "invert"]]) {
+        let (code, _, err) = run(nephroid().current_dir(room.directory.path()).arg("render").arg(room.scene()).args(&wrong));
+        assert_eq!(code, 2, "{wrong:?}: {err}");
+    }
+    let (code, _, err) = run(nephroid().current_dir(room.directory.path()).arg("render").arg(room.scene()).args([
+        "-o",
+        "b.exr",
+        "--layers=200",
+        "--max-length",
+        "300",
+        "--max-memory",
+        "3MB",
+    ]));
+    assert!(code == 2 && err.contains("needs"), "{err}");
+    assert!(!room.path("b.exr").exists());
+}

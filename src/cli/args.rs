@@ -183,9 +183,24 @@ pub struct RenderArgs {
     /// Transport.
     #[command(flatten, next_help_heading = "Transport")]
     pub transport: TransportArgs,
+    /// Layers.
+    #[command(flatten, next_help_heading = "Layers")]
+    pub layers: LayersArgs,
     /// Finite elements.
     #[command(flatten, next_help_heading = "Finite elements (--estimator invert, iterate)")]
     pub elements: ElementsArgs,
+}
+
+/// How to take the image apart.
+#[derive(Clone, Debug, Args)]
+pub struct LayersArgs {
+    /// Write the terms n = 0, 1, … N of the Neumann series (n scatterings; the last with all beyond) as
+    /// layers of .exr outputs; they sum to the image [default N: 8].
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, value_parser = clap::value_parser!(u32).range(0..=255))]
+    pub layers: Option<Option<u32>>,
+    /// Write a contact sheet of the terms and of their partial sums.
+    #[arg(long, value_name = "OUT.png", value_hint = ValueHint::FilePath)]
+    pub gallery: Option<PathBuf>,
 }
 
 /// Into which elements surfaces are cut, and how their equation is solved.

@@ -98,7 +98,7 @@ pub fn run(args: &RenderArgs, command: &[OsString], method: Method) -> Result<Ex
     let mut faults = job.write_meshes(&meshes, &solved, smooth.as_ref());
     if !outputs.is_empty() {
         let film = job.film(&solved, smooth.as_ref())?;
-        faults.extend(outputs.write(&film, &job.attributes(command)));
+        faults.extend(outputs.write(&film, &[], &job.attributes(command)));
     }
     job.figure("total_seconds", start.elapsed().as_secs_f64());
     if let Some(path) = &args.stats {

@@ -6,6 +6,7 @@
 //! - [`args`], [`units`]: what can be written.
 //! - [`open`]: a scene file into a built scene.
 //! - [`render`], [`output`], [`progress`], [`interrupt`]: rendering.
+//! - [`layers`]: what is written beside the image.
 //! - [`elements`]: rendering by finite elements.
 //! - [`info`], [`compare`], [`proof`]: the other subcommands.
 
@@ -14,6 +15,7 @@ pub mod compare;
 pub mod elements;
 pub mod info;
 pub mod interrupt;
+pub mod layers;
 pub mod open;
 pub mod output;
 pub mod progress;

@@ -39,8 +39,8 @@ impl Outputs {
         Ok(Self { paths: args.output.clone(), png: PngOptions { exposure: args.exposure, ..PngOptions::default() } })
     }
 
-    /// Writes all files; what failed, after all have been tried.
-    pub fn write(&self, film: &Film, attributes: &BTreeMap<String, String>) -> Vec<Fault> {
+    /// Writes all files, with layers by name beside the image; what failed, after all have been tried.
+    pub fn write(&self, film: &Film, layers: &[(String, Vec<[f32; 3]>)], attributes: &BTreeMap<String, String>) -> Vec<Fault> {
         let mut file = ImageFile::new(film.width(), film.height());
         file.attributes.clone_from(attributes);
         file.insert_rgb("", &film.mean());
@@ -48,6 +48,7 @@ impl Outputs {
             file.insert_rgb("variance", &film.variance_of_mean());
             file.insert_rgb("blockVariance", &film.variance_of_tile_mean());
         }
+        layers.iter().for_each(|(name, pixels)| file.insert_rgb(name, pixels));
         self.paths.iter().filter_map(|path| write_image(path, &file, self.png).err()).collect()
     }
 

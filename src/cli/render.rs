@@ -5,7 +5,8 @@ use super::open::{self, Described, Opened};
 use super::output::{self, Outputs};
 use super::progress::ProgressLine;
 use super::units::{show_count, show_duration};
-use super::{Exit, Failure, elements, interrupt, tell};
+use super::{Exit, Failure, elements, interrupt, layers, tell};
+use crate::io::fault::{Fault, reason};
 use crate::io::write::write_atomic;
 use crate::render::{Budget, Control, Estimator, Options, Outcome, Render};
 use crate::scene::Scene;
@@ -25,10 +26,14 @@ const DEFAULT_SPP: u64 = 64;
 /// Renders and writes.
 pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
     if let Some(method) = elements::method(args) {
+        if layers::wanted(&args.layers) {
+            return Err(Failure::usage("finite elements have no layers: choose an estimator that walks"));
+        }
         return elements::run(args, command, method);
     }
     let start = Instant::now();
     let outputs = Outputs::check(args)?;
+    layers::check(args)?;
     let paths = args.transport.paths.as_deref().map(PathFilter::parse).transpose();
     let paths = paths.map_err(|e| Failure::usage(format!("--paths: {e}")))?.unwrap_or_default();
     open::set_threads(args.scene.threads);
@@ -44,6 +49,11 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
     if shortest > longest {
         return Err(Failure::usage(format!("no path is at least {shortest} and at most {longest} edges long")));
     }
+    options.layers = layers::partitions(&args.layers, &options.settings);
+    let film = &opened.scene.film;
+    let [_, _, width, height] = film.crop.unwrap_or([0, 0, film.width, film.height]);
+    let whole = output::memory_needed(width, height, args.transport.light_paths, options.settings.techniques.shoots());
+    layers::check_memory(&options.layers, whole, [width, height], args.max_memory)?;
     let budget = budget(&opened.scene, args);
     let mut job = Job { args, command, outputs, estimator, options, budget, start };
     if !args.quiet {
@@ -171,7 +181,7 @@ impl Job<'_> {
                 break;
             }
             let before = Instant::now();
-            let faults = self.outputs.write(render.film(), &self.attributes(&render, scene));
+            let faults = self.write(&render, scene);
             // Writing shall not take more than a tenth of the time.
             save_after = SAVE_EVERY.max(before.elapsed() * 10);
             if let (Some(fault), false) = (faults.first(), warned) {
@@ -184,14 +194,19 @@ impl Job<'_> {
         self.finish(&render, scene)
     }
 
+    /// Writes the images.
+    fn write(&self, render: &Render, scene: &Scene) -> Vec<Fault> {
+        let layers = layers::of_image(&self.args.layers, render);
+        self.outputs.write(render.film(), &layers, &self.attributes(render, scene))
+    }
+
     /// Writes what there is, and says what was done.
     fn finish(&self, render: &Render, scene: &Scene) -> Result<Exit, Failure> {
-        let mut faults = self.outputs.write(render.film(), &self.attributes(render, scene));
+        let mut faults = self.write(render, scene);
+        faults.extend(layers::write(self.args, render));
         if let Some(path) = &self.args.stats {
             let text = serde_json::to_string_pretty(&self.figures(render, scene)).unwrap_or_default() + "\n";
-            let written = write_atomic(path, |out| {
-                out.write_all(text.as_bytes()).map_err(|e| crate::io::fault::Fault::new(crate::io::fault::reason(&e)))
-            });
+            let written = write_atomic(path, |out| out.write_all(text.as_bytes()).map_err(|e| Fault::new(reason(&e))));
             faults.extend(written.err());
         }
         if !self.args.quiet {

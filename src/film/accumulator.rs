@@ -223,6 +223,11 @@ impl Film {
         self.tiles.par_iter_mut().enumerate().map(move |(i, t)| (i, layout.tile_rect(i), t))
     }
 
+    /// The same for one thread, in the order of tiles.
+    pub fn each_tile_mut(&mut self) -> impl Iterator<Item = &mut Tile> {
+        self.tiles.iter_mut()
+    }
+
     /// Notes that these passes are complete in every tile.
     pub fn add_passes(&mut self, range: Range<u64>) -> Result<(), MergeError> {
         let first = range.start;

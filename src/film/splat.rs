@@ -11,30 +11,30 @@ use rayon::prelude::*;
 /// A contribution of a shooting walk to a pixel ([`Layout::pixel`] numbers pixels).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
-pub struct Splat {
+pub struct Splat<V = [f32; 3]> {
     /// Pixel number.
     pub pixel: u32,
-    /// Linear sRGB.
-    pub value: [f32; 3],
+    /// Linear sRGB, or that and what else the film's owner wants to know of a contribution.
+    pub value: V,
 }
 
 /// The splats of one pass, by tile. Keeps its memory from pass to pass.
 #[derive(Clone, Debug, Default)]
-pub struct SplatBins {
-    parts: Vec<Part>,
+pub struct SplatBins<V = [f32; 3]> {
+    parts: Vec<Part<V>>,
 }
 
 #[derive(Clone, Debug, Default)]
-struct Part {
-    splats: Vec<Splat>,
+struct Part<V> {
+    splats: Vec<Splat<V>>,
     /// Where each tile's splats begin; one more at the end.
     starts: Vec<u32>,
 }
 
-impl SplatBins {
+impl<V: Copy + Default + Send + Sync> SplatBins<V> {
     /// Takes over the splats of the jobs of a pass; splats beyond the layout are left out.
     /// At most 2³² − 1 splats per list and thread.
-    pub fn fill(&mut self, layout: Layout, jobs: &[Vec<Splat>]) {
+    pub fn fill(&mut self, layout: Layout, jobs: &[Vec<Splat<V>>]) {
         let total: usize = jobs.iter().map(Vec::len).sum();
         // A part for each thread, but none so small that its table of tiles dominates.
         let parts = rayon::current_num_threads().min(total / (4 * layout.tiles()).max(1024)).max(1);
@@ -55,7 +55,7 @@ impl SplatBins {
 
     /// The splats of a tile.
     #[inline]
-    pub fn tile(&self, tile: usize) -> impl Iterator<Item = &Splat> {
+    pub fn tile(&self, tile: usize) -> impl Iterator<Item = &Splat<V>> {
         self.parts.iter().flat_map(move |p| match p.starts.get(tile..tile + 2) {
             Some([from, to]) => &p.splats[*from as usize..*to as usize],
             _ => &[],
@@ -63,9 +63,9 @@ impl SplatBins {
     }
 }
 
-impl Part {
-    fn fill(&mut self, tiles: usize, jobs: &[Vec<Splat>]) {
-        let inside = |s: &&Splat| Layout::tile_of(s.pixel) < tiles;
+impl<V: Copy + Default> Part<V> {
+    fn fill(&mut self, tiles: usize, jobs: &[Vec<Splat<V>>]) {
+        let inside = |s: &&Splat<V>| Layout::tile_of(s.pixel) < tiles;
         self.starts.clear();
         self.starts.resize(tiles + 1, 0);
         for s in jobs.iter().flatten().filter(inside) {

@@ -1,5 +1,6 @@
 //! Estimators by the equation they expand, and what a scene asks of them.
 
+use super::Partition;
 use crate::scene::Scene;
 use crate::transport::mis::Heuristic;
 use crate::transport::settings::{Settings, Techniques};
@@ -62,6 +63,8 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Crop window (x, y, width, height) instead of the scene's own.
     pub crop: Option<[u32; 4]>,
+    /// How to take the image apart, besides.
+    pub layers: Vec<Partition>,
 }
 
 impl Options {
@@ -75,7 +78,7 @@ impl Options {
             hide_emitters: i.hide_emitters,
             ..Settings::default()
         };
-        Self { settings, threads: None, crop: None }
+        Self { settings, ..Self::default() }
     }
 
     /// Hash of all that decides the value of a sample.

@@ -17,12 +17,15 @@
 
 mod estimator;
 mod known;
+mod layers;
 mod measure;
 mod passes;
 mod pilot;
+mod sink;
 
 pub use estimator::{Estimator, Options};
 pub use known::film_of;
+pub use layers::{Layers, Partition};
 pub use measure::{Measurement, PixelMeasurement, measure};
 pub use passes::SHOOT_JOB;
 
@@ -141,6 +144,7 @@ pub struct Render<'a> {
     scene: &'a Scene,
     plan: Plan,
     film: Film,
+    layers: Vec<Layers>,
     filter: Filter,
     /// Crop window in the whole film: x, y, width, height.
     crop: [u32; 4],
@@ -173,7 +177,8 @@ impl<'a> Render<'a> {
         let plan = Plan { guide: decisions.guide, ..Plan::new(&options.settings, pixels, film_pixels, vertices) };
         film.identity.decisions = vertices.to_bits().to_le_bytes().to_vec();
         film.identity.hash = options.identity(scene);
-        Ok(Self { scene, plan, film, filter, crop, pool, statistics: Statistics::default() })
+        let layers = options.layers.iter().map(|p| Layers::new(p, &film)).collect::<Result<_, _>>()?;
+        Ok(Self { scene, plan, film, layers, filter, crop, pool, statistics: Statistics::default() })
     }
 
     /// Renders until the budget is used up or `progress` says stop; may be called again to go on.
@@ -219,6 +224,11 @@ impl<'a> Render<'a> {
     /// The film so far.
     pub fn film(&self) -> &Film {
         &self.film
+    }
+
+    /// The same taken apart, in the order of [`Options::layers`].
+    pub fn layers(&self) -> &[Layers] {
+        &self.layers
     }
 
     /// The film, without the render.

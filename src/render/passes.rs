@@ -1,7 +1,8 @@
 //! One pass after another: shoot, sort, gather.
 
-use super::Render;
-use crate::film::{Layout, Splat, SplatBins, TileBuffer};
+use super::sink::{Divided, Sink, Whole};
+use super::{Partition, Render};
+use crate::film::{Layout, Splat, SplatBins};
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::transport::cache::{LightCache, LightVertex};
@@ -18,28 +19,28 @@ use std::time::Instant;
 pub const SHOOT_JOB: u32 = 4096;
 
 /// Writes what gathering walks find into the pixel being sampled.
-struct PixelRecord<'a> {
-    buffer: &'a mut TileBuffer,
+struct PixelRecord<'a, S> {
+    sink: &'a mut S,
     local: usize,
 }
 
-impl Record for PixelRecord<'_> {
+impl<S: Sink> Record for PixelRecord<'_, S> {
     #[inline]
     fn gathered(&mut self, c: Contribution) {
-        self.buffer.add(self.local, c.value.to_rgb());
+        self.sink.add(self.local, &S::keep(&c));
     }
     fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
 }
 
 /// Writes what shooting walks find as messages to pixels.
-struct SplatRecord<'a> {
+struct SplatRecord<'a, S: Sink> {
     filter: &'a crate::film::Filter,
     layout: Layout,
     crop: [u32; 4],
-    splats: Vec<Splat>,
+    splats: Vec<Splat<S::Kept>>,
 }
 
-impl Record for SplatRecord<'_> {
+impl<S: Sink> Record for SplatRecord<'_, S> {
     fn gathered(&mut self, _: Contribution) {}
     #[inline]
     fn splatted(&mut self, raster: Vec2, random: &mut Random, c: Contribution) {
@@ -47,45 +48,49 @@ impl Record for SplatRecord<'_> {
         let (x, y) = (i64::from(x) - i64::from(self.crop[0]), i64::from(y) - i64::from(self.crop[1]));
         if (0..i64::from(self.crop[2])).contains(&x) && (0..i64::from(self.crop[3])).contains(&y) {
             let pixel = self.layout.pixel(x as u32, y as u32);
-            self.splats.push(Splat { pixel, value: (c.value * weight).to_rgb() });
+            self.splats.push(Splat { pixel, value: S::keep(&Contribution { value: c.value * weight, ..c }) });
         }
     }
 }
 
 /// What a shooting job found.
-struct Shot {
-    splats: Vec<Splat>,
+struct Shot<V> {
+    splats: Vec<Splat<V>>,
     vertices: Vec<LightVertex>,
     rays: RayCounts,
 }
 
-/// Runs these passes into the film of `render`.
+/// Runs these passes into the film of `render`, and into its layers where there are any.
 pub fn run(render: &mut Render<'_>, range: Range<u64>) {
+    if render.layers.is_empty() { run_into::<Whole>(render, range) } else { run_into::<Divided>(render, range) }
+}
+
+fn run_into<S: Sink>(render: &mut Render<'_>, range: Range<u64>) {
     if render.plan.light_paths == 0 {
-        gather_passes(render, range, &LightCache::default(), None);
+        gather_passes::<S>(render, range, &LightCache::default(), None);
         return;
     }
     let mut bins = SplatBins::default();
     for pass in range {
         let before = Instant::now();
-        let (cache, splats) = shoot_pass(render, pass);
+        let (cache, splats) = shoot_pass::<S>(render, pass);
         bins.fill(render.film.layout(), &splats);
         render.statistics.light_vertices = u64::from(cache.len());
         render.statistics.shoot_time += before.elapsed();
-        gather_passes(render, pass..pass + 1, &cache, Some(&bins));
+        gather_passes::<S>(render, pass..pass + 1, &cache, Some(&bins));
     }
 }
 
 /// Shoots all light paths of a pass.
-fn shoot_pass(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat>>) {
+fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat<S::Kept>>>) {
     let plan = &render.plan;
     let cx = Context { scene: render.scene, plan };
     let jobs = plan.light_paths.div_ceil(SHOOT_JOB);
-    let shots: Vec<Shot> = (0..jobs)
+    let shots: Vec<Shot<S::Kept>> = (0..jobs)
         .into_par_iter()
         .map(|job| {
             let paths = job * SHOOT_JOB..((job + 1).saturating_mul(SHOOT_JOB)).min(plan.light_paths);
-            let mut record = SplatRecord {
+            let mut record = SplatRecord::<S> {
                 filter: &render.filter,
                 layout: render.film.layout(),
                 crop: render.crop,
@@ -113,23 +118,26 @@ fn shoot_pass(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat>
 }
 
 /// Gathers one sample per pixel and pass, adds the splats, and commits the passes to the film.
-fn gather_passes(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache, bins: Option<&SplatBins>) {
+fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache, bins: Option<&SplatBins<S::Kept>>) {
     let (scene, plan, filter, crop) = (render.scene, &render.plan, &render.filter, render.crop);
     let cx = Context { scene, plan };
     let exponent = render.film.exponent();
     let gathers = plan.settings.techniques.gathers();
     let film_width = u64::from(scene.film.width);
     let passes = range.clone();
-    let rays = render
-        .film
-        .tiles_mut()
-        .map(|(index, rect, tile)| {
-            let mut buffer = TileBuffer::new(exponent);
+    let layout = render.film.layout();
+    let partitions: Vec<Partition> = render.layers.iter().map(|l| l.partition.clone()).collect();
+    let rays = S::tiles(&mut render.film, &mut render.layers)
+        .into_par_iter()
+        .enumerate()
+        .map(|(index, mut tiles)| {
+            let mut sink = S::new(exponent, &partitions);
+            let rect = layout.tile_rect(index);
             let mut rays = RayCounts::default();
             for pass in passes.clone() {
                 if let Some(bins) = bins {
                     for s in bins.tile(index) {
-                        buffer.add(Layout::local_of(s.pixel), s.value);
+                        sink.add(Layout::local_of(s.pixel), &s.value);
                     }
                 }
                 if gathers {
@@ -139,12 +147,12 @@ fn gather_passes(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache,
                         let mut random = Random::new(Family::Gather, id, pass, plan.settings.seed);
                         let (offset, weight) = filter.sample_offset(random.unit2());
                         let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
-                        let mut record = PixelRecord { buffer: &mut buffer, local };
+                        let mut record = PixelRecord { sink: &mut sink, local };
                         let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
                         gather(cx, raster, weight, cache, &mut random, &mut tally);
                     }
                 }
-                tile.commit(&mut buffer);
+                sink.commit(&mut tiles);
             }
             rays
         })
@@ -154,6 +162,8 @@ fn gather_passes(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache,
         });
     render.statistics.rays.add(&rays);
     // The range was free: `run` and `run_passes` ask for passes that are not in the film.
-    let added = render.film.add_passes(range);
-    debug_assert!(added.is_ok());
+    for film in std::iter::once(&mut render.film).chain(render.layers.iter_mut().flat_map(|l| &mut l.films)) {
+        let added = film.add_passes(range.clone());
+        debug_assert!(added.is_ok());
+    }
 }

@@ -7,12 +7,14 @@
 //! - [`welch`]: whether two estimates with known variance have the same expectation.
 //! - [`comparison`]: all of them, as text and as JSON.
 //! - [`coverage`]: which paths an estimator cannot make in a scene.
+//! - [`sheet`]: contact sheets of pictures.
 
 pub mod agreement;
 pub mod comparison;
 pub mod coverage;
 pub mod flip;
 pub mod measures;
+pub mod sheet;
 pub mod welch;
 
 pub use comparison::{Comparison, compare};

@@ -32,9 +32,10 @@ use crate::spectrum::Spectrum;
 use glam::Vec2;
 
 /// The join that made a path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Technique {
     /// The gathering walk arrived on an emitter: s = 0.
+    #[default]
     Hit,
     /// A light point was picked from the last gathering vertex: s = 1.
     NextEvent,
@@ -45,7 +46,7 @@ pub enum Technique {
 }
 
 /// One weighted path of a measurement.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Contribution {
     /// Estimate of the pixel's measurement by this path, MIS weight included.
     pub value: Spectrum,

@@ -151,31 +151,3 @@ fn constant_radiance_by_shooting() {
     );
     radiance_is_constant(&world, Estimator::Shoot, 1024);
 }
-
-/// x = 0.1 x + 1.8 as a scene: every path of n scatterings returns the same number, so hits alone
-/// have no variance and D scatterings give 2(1 − 0.1^{D+1}).
-#[test]
-fn hits_alone_are_exact_in_a_lambert_box() {
-    let world = scene(
-        r#"<scene version="3.0.0">
-  <sensor type="perspective"><float name="fov" value="80"/>
-    <transform name="to_world"><lookat origin="0.3, 0.2, 0.5" target="-0.2, 0, 0" up="0, 1, 0"/></transform>
-    <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="16"/><rfilter type="box"/></film></sensor>
-  <shape type="cube"><boolean name="flip_normals" value="true"/>
-    <bsdf type="diffuse"><rgb name="reflectance" value="0.1"/></bsdf>
-    <emitter type="area"><rgb name="radiance" value="1.8"/></emitter></shape>
-</scene>"#,
-    );
-    for scatterings in 0..5u32 {
-        let mut options = Options::for_scene(&world, Estimator::Gather);
-        options.settings.techniques.next_event = false;
-        options.settings.rr_depth = 1000;
-        options.settings.max_length = scatterings + 1;
-        let mut render = Render::new(&world, &options).unwrap();
-        render.run(&Budget::passes(4), |_| Control::Continue);
-        let exact = 2.0 * (1.0 - 0.1f32.powi(scatterings as i32 + 1));
-        for m in render.picture().mean {
-            assert!((m[0] - exact).abs() < 1e-5, "{scatterings} scatterings: {} instead of {exact}", m[0]);
-        }
-    }
-}

@@ -1,0 +1,4 @@
+//! The expansion Σ τⁿLᵉ taken apart: layers, techniques and lights of one render, and what is left out of it.
+
+mod layers;
+mod support;
