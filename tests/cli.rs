@@ -405,3 +405,32 @@ fn layers_and_gallery_of_one_render() {
     assert!(code == 2 && err.contains("needs"), "{err}");
     assert!(!room.path("b.exr").exists());
 }
+
+#[test]
+fn pyramid_and_light_groups_of_one_render() {
+    let room = Room::new();
+    let scene = room.changed("<shape type=\"sphere\">", "<shape type=\"sphere\" id=\"moon\">");
+    let (image, pyramid) = (room.path("a.exr"), room.path("pyramid"));
+    let mut command = nephroid();
+    command.arg("render").arg(&scene).args(["--light-groups", "--pyramid-length=2", "-o"]).arg(&image);
+    let (code, _, err) = run(command.arg("--pyramid").arg(&pyramid));
+    assert_eq!(code, 0, "{err}");
+    let file = read_image(&image).expect("an image");
+    assert!(file.rgb("light.moon").expect("a light") == file.rgb("").expect("the beauty"), "there is one light");
+    let table = std::fs::read_to_string(pyramid.join("pyramid.json")).expect("a table");
+    let table: serde_json::Value = serde_json::from_str(&table).expect("JSON");
+    let entries = table.as_array().expect("a list");
+    let energy: f64 = entries.iter().filter_map(|e| e["share_of_energy"].as_f64()).sum();
+    assert!((energy - 1.0).abs() < 1e-5, "{energy}");
+    // Lights are hit, floors lit by hits and next events; of longer paths there are all four.
+    let names: Vec<String> =
+        entries.iter().map(|e| format!("{} {}", e["length"], e["technique"].as_str().unwrap_or(""))).collect();
+    assert_eq!(names, ["1 hit", "2 hit", "2 nee", "3 hit", "3 nee", "3 connect", "3 splat"]);
+    let direct = read_image(&pyramid.join("k2.s1t2.exr")).expect("an image of a join");
+    assert!(direct.rgb("raw").is_some() && direct.rgb("variance").is_some() && direct.rgb("rawVariance").is_some());
+    for sheet in ["weighted.png", "raw.png"] {
+        assert!(image::open(pyramid.join(sheet)).expect("a sheet").width() > 300);
+    }
+    let (code, _, err) = run(nephroid().arg("render").arg(&scene).args(["--light-groups=x=sun", "-o"]).arg(&image));
+    assert!(code == 2 && err.contains("moon"), "{err}");
+}

@@ -1,6 +1,7 @@
 //! What can be written on the command line.
 
 use super::units;
+use crate::render::layers::Joins;
 use crate::report::comparison::Metric;
 use crate::transport::mis::Heuristic;
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
@@ -201,6 +202,17 @@ pub struct LayersArgs {
     /// Write a contact sheet of the terms and of their partial sums.
     #[arg(long, value_name = "OUT.png", value_hint = ValueHint::FilePath)]
     pub gallery: Option<PathBuf>,
+    /// Write into this directory what every join adds to every path length, raw and weighted: images, a
+    /// table and contact sheets.
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub pyramid: Option<PathBuf>,
+    /// Longest paths that the pyramid shows apart.
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=i64::from(Joins::LONGEST)))]
+    pub pyramid_length: u32,
+    /// Write what every light adds as layers of .exr outputs; GROUPS such as 'lamps=desk,lamp*;sky=env'
+    /// name emitters by their ids.
+    #[arg(long, value_name = "GROUPS", num_args = 0..=1, require_equals = true)]
+    pub light_groups: Option<Option<String>>,
 }
 
 /// Into which elements surfaces are cut, and how their equation is solved.

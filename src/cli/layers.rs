@@ -2,12 +2,19 @@
 
 use super::args::{LayersArgs, RenderArgs};
 use super::{Failure, output};
-use crate::io::fault::Fault;
+use crate::film::Film;
+use crate::io::exr::ImageFile;
+use crate::io::fault::{Fault, io_fault};
 use crate::io::png::PngOptions;
-use crate::io::write::{OutputFormat, check_writable, write_image};
+use crate::io::write::{OutputFormat, check_writable, write_atomic, write_image};
+use crate::render::layers::{Joins, LightGroups};
 use crate::render::{Layers, Partition, Render};
+use crate::report::pyramid;
 use crate::report::sheet::{Cell, sheet};
+use crate::scene::Scene;
 use crate::transport::settings::Settings;
+use std::io::Write;
+use std::path::Path;
 
 /// Last term of the Neumann series that a gallery shows apart where nobody says.
 const LAST_TERM: u32 = 8;
@@ -23,27 +30,41 @@ pub fn check(args: &RenderArgs) -> Result<(), Failure> {
         }
         check_writable(path).map_err(|f| Failure::output(f.to_string()))?;
     }
+    if let Some(directory) = &args.layers.pyramid {
+        let made = std::fs::create_dir_all(directory).map_err(|e| crate::io::fault::reason(&e));
+        let made = made.and_then(|()| output::check_directory(&directory.join("pyramid.json")));
+        made.map_err(|what| Failure::output(format!("cannot write into {}: {what}", directory.display())))?;
+    }
     let to_exr = args.output.iter().any(|o| matches!(OutputFormat::of(o), Ok(OutputFormat::Exr)));
-    if args.layers.layers.is_some() && !to_exr {
-        return Err(Failure::usage("--layers writes into an .exr output: add one by -o"));
+    let asked = [(args.layers.layers.is_some(), "--layers"), (args.layers.light_groups.is_some(), "--light-groups")];
+    if let (Some((_, name)), false) = (asked.iter().find(|a| a.0), to_exr) {
+        return Err(Failure::usage(format!("{name} writes into an .exr output: add one by -o")));
     }
     Ok(())
 }
 
 /// Whether anything is asked that only walks can give.
 pub fn wanted(args: &LayersArgs) -> bool {
-    args.layers.is_some() || args.gallery.is_some()
+    args.layers.is_some() || args.gallery.is_some() || args.pyramid.is_some() || args.light_groups.is_some()
 }
 
 /// How the render is to be taken apart.
-pub fn partitions(args: &LayersArgs, settings: &Settings) -> Vec<Partition> {
+pub fn partitions(args: &LayersArgs, settings: &Settings, scene: &Scene) -> Result<Vec<Partition>, Failure> {
     let mut partitions = Vec::new();
     if args.layers.is_some() || args.gallery.is_some() {
         let last = args.layers.flatten().unwrap_or(LAST_TERM);
         let longest = settings.max_length.max(1) - 1;
         partitions.push(Partition::Scatterings { last: last.min(longest), rest: longest > last });
     }
-    partitions
+    if args.pyramid.is_some() {
+        partitions.push(Partition::Joins(Joins::new(settings.techniques, args.pyramid_length, settings.max_length)));
+    }
+    if let Some(groups) = &args.light_groups {
+        let emitters = scene.lights.infos();
+        let groups = groups.as_deref().map_or_else(|| LightGroups::each(emitters), |text| LightGroups::parse(text, emitters));
+        partitions.push(Partition::Lights(groups.map_err(|e| Failure::usage(format!("--light-groups: {e}")))?));
+    }
+    Ok(partitions)
 }
 
 /// Refuses what has no room beside a render that needs `whole` bytes.
@@ -58,6 +79,8 @@ pub fn check_memory(partitions: &[Partition], whole: u64, size: [u32; 2], limit:
 pub fn of_image(args: &LayersArgs, render: &Render<'_>) -> Vec<(String, Vec<[f32; 3]>)> {
     let wanted = |l: &&Layers| match l.partition {
         Partition::Scatterings { .. } => args.layers.is_some(),
+        Partition::Joins(_) => false,
+        Partition::Lights(_) => true,
     };
     let layers = render.layers().iter().filter(wanted);
     layers.flat_map(|l| l.films.iter().enumerate().map(|(i, f)| (l.partition.name(i), f.mean()))).collect()
@@ -67,18 +90,50 @@ pub fn of_image(args: &LayersArgs, render: &Render<'_>) -> Vec<(String, Vec<[f32
 pub fn write(args: &RenderArgs, render: &Render<'_>) -> Vec<Fault> {
     let mut faults = Vec::new();
     for layers in render.layers() {
-        if let (Partition::Scatterings { .. }, Some(path)) = (&layers.partition, &args.layers.gallery) {
-            let film = render.film();
-            let file = sheet(&gallery(layers, args.exposure), [film.width(), film.height()], args.exposure);
-            faults.extend(write_image(path, &file, PngOptions::default()).err());
+        match (&layers.partition, &args.layers.gallery, &args.layers.pyramid) {
+            (Partition::Scatterings { .. }, Some(path), _) => {
+                faults.extend(write_sheet(path, &gallery(layers, args.exposure), render.film(), args.exposure).err());
+            }
+            (Partition::Joins(joins), _, Some(directory)) => {
+                faults.extend(write_pyramid(directory, joins, layers, render.film(), args.exposure));
+            }
+            _ => {}
         }
     }
     faults
 }
 
+fn write_sheet(path: &Path, rows: &[Vec<Cell>], film: &Film, exposure: f32) -> Result<(), Fault> {
+    write_image(path, &sheet(rows, [film.width(), film.height()], exposure), PngOptions::default())
+}
+
+/// An image of every join, a table and two sheets.
+fn write_pyramid(directory: &Path, joins: &Joins, layers: &Layers, whole: &Film, exposure: f32) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (join, films) in joins.list().iter().zip(layers.films.chunks_exact(2)) {
+        let mut file = ImageFile::new(whole.width(), whole.height());
+        for (film, [mean, variance]) in films.iter().zip([["", "variance"], ["raw", "rawVariance"]]) {
+            file.insert_rgb(mean, &film.mean());
+            if film.passes().count() >= 2 {
+                file.insert_rgb(variance, &film.variance_of_mean());
+            }
+        }
+        faults.extend(write_image(&directory.join(join.name() + ".exr"), &file, PngOptions::default()).err());
+    }
+    let table = pyramid::table(layers, whole);
+    for (name, raw) in [("weighted.png", false), ("raw.png", true)] {
+        let rows = pyramid::rows(layers, &table, raw, exposure);
+        faults.extend(write_sheet(&directory.join(name), &rows, whole, exposure).err());
+    }
+    let text = serde_json::to_string_pretty(&table).unwrap_or_default() + "\n";
+    let written = write_atomic(&directory.join("pyramid.json"), |out| out.write_all(text.as_bytes()).map_err(io_fault));
+    faults.extend(written.err());
+    faults
+}
+
 /// Terms above, partial sums below.
 fn gallery(layers: &Layers, exposure: f32) -> Vec<Vec<Cell>> {
-    let Partition::Scatterings { last, rest } = layers.partition;
+    let Partition::Scatterings { last, rest } = layers.partition else { return Vec::new() };
     let (mut terms, mut sums) = (Vec::new(), Vec::new());
     let mut sum: Vec<[f64; 3]> = Vec::new();
     for (n, film) in layers.films.iter().enumerate() {

@@ -49,7 +49,7 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
     if shortest > longest {
         return Err(Failure::usage(format!("no path is at least {shortest} and at most {longest} edges long")));
     }
-    options.layers = layers::partitions(&args.layers, &options.settings);
+    options.layers = layers::partitions(&args.layers, &options.settings, &opened.scene)?;
     let film = &opened.scene.film;
     let [_, _, width, height] = film.crop.unwrap_or([0, 0, film.width, film.height]);
     let whole = output::memory_needed(width, height, args.transport.light_paths, options.settings.techniques.shoots());

@@ -17,7 +17,7 @@
 
 mod estimator;
 mod known;
-mod layers;
+pub mod layers;
 mod measure;
 mod passes;
 mod pilot;

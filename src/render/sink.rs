@@ -84,13 +84,14 @@ impl Sink for Divided {
     }
     #[inline]
     fn add(&mut self, local: usize, c: &Contribution) {
-        let value = c.value.to_rgb();
-        self.whole.add(local, value);
+        self.whole.add(local, c.value.to_rgb());
         let mut first = 0;
         for partition in &self.partitions {
-            let (buffer, touched) = &mut self.parts[first + partition.part(c)];
-            buffer.add(local, value);
-            *touched = true;
+            partition.deal(c, |part, value| {
+                let (buffer, touched) = &mut self.parts[first + part];
+                buffer.add(local, value);
+                *touched = true;
+            });
             first += partition.parts();
         }
     }

@@ -7,6 +7,7 @@
 //! - [`welch`]: whether two estimates with known variance have the same expectation.
 //! - [`comparison`]: all of them, as text and as JSON.
 //! - [`coverage`]: which paths an estimator cannot make in a scene.
+//! - [`pyramid`]: what each join adds to each path length.
 //! - [`sheet`]: contact sheets of pictures.
 
 pub mod agreement;
@@ -14,6 +15,7 @@ pub mod comparison;
 pub mod coverage;
 pub mod flip;
 pub mod measures;
+pub mod pyramid;
 pub mod sheet;
 pub mod welch;
 

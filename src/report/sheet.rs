@@ -43,15 +43,22 @@ impl Cell {
     /// Brightened (never darkened) by whole stops until the brightest hundredth of its pixels is about
     /// white at `exposure`; the label says by how many.
     pub fn brightened(label: impl Into<String>, pixels: Vec<[f32; 3]>, exposure: f32) -> Self {
-        let mut values: Vec<f32> = pixels.iter().map(|p| p[0].max(p[1]).max(p[2])).filter(|v| v.is_finite()).collect();
-        let at = values.len() * 99 / 100;
-        let bright = if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(at, f32::total_cmp).1 };
-        let stops = if bright > 0.0 { -(bright.log2() + exposure).ceil() } else { 0.0 };
-        let stops = (stops as i32).clamp(0, MOST_STOPS);
-        let label = label.into();
-        let label = if stops > 0 { format!("{label} (+{stops} EV)") } else { label };
-        Self { label, pixels, stops }
+        let stops = stops(&pixels, exposure).unwrap_or(0);
+        Self { label: label.into(), pixels, stops }
     }
+
+    fn text(&self) -> String {
+        if self.stops > 0 { format!("{} (+{} EV)", self.label, self.stops) } else { self.label.clone() }
+    }
+}
+
+/// Whole stops, at least 0, that make the brightest hundredth of the pixels about white at `exposure`; none
+/// where all are black.
+pub fn stops(pixels: &[[f32; 3]], exposure: f32) -> Option<i32> {
+    let mut values: Vec<f32> = pixels.iter().map(|p| p[0].max(p[1]).max(p[2])).filter(|v| v.is_finite()).collect();
+    let at = values.len() * 99 / 100;
+    let bright = if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(at, f32::total_cmp).1 };
+    (bright > 0.0).then(|| (-(bright.log2() + exposure).ceil() as i32).clamp(0, MOST_STOPS))
 }
 
 /// The sheet of rows of pictures of `width` × `height` pixels, ready to be written without any more exposure.
@@ -64,7 +71,7 @@ pub fn sheet(rows: &[Vec<Cell>], [width, height]: [u32; 2], exposure: f32) -> Im
     for (j, row) in rows.iter().enumerate() {
         for (i, cell) in row.iter().enumerate() {
             let at = [GAP + i as u32 * (w + GAP), GAP + j as u32 * (h + LINE + GAP)];
-            canvas.text(&cell.label, at, w);
+            canvas.text(&cell.text(), at, w);
             if cell.pixels.len() == width as usize * height as usize {
                 let factor = (exposure + cell.stops as f32).exp2();
                 for (x, y) in (0..h).flat_map(|y| (0..w).map(move |x| (x, y))) {
@@ -185,8 +192,8 @@ mod tests {
     #[test]
     fn dark_pictures_are_brightened_and_say_so() {
         let cell = Cell::brightened("n = 3", vec![[0.1; 3]; 100], 0.0);
-        assert_eq!((cell.stops, cell.label.as_str()), (3, "n = 3 (+3 EV)"));
+        assert_eq!((cell.stops, cell.text().as_str()), (3, "n = 3 (+3 EV)"));
         assert_eq!(Cell::brightened("n = 0", vec![[7.0; 3]; 100], 0.0).stops, 0);
-        assert_eq!(Cell::brightened("black", vec![[0.0; 3]; 100], 0.0).label, "black");
+        assert_eq!(Cell::brightened("black", vec![[0.0; 3]; 100], 0.0).text(), "black");
     }
 }

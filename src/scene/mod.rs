@@ -69,6 +69,12 @@ impl EmitterId {
     pub const NONE: Self = Self(u32::MAX);
 }
 
+impl Default for EmitterId {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
 /// All that is known of a surface point before its local model is resolved.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {

@@ -2,7 +2,7 @@
 
 use super::class::Positions;
 use super::mis::Partial;
-use crate::scene::Surface;
+use crate::scene::{EmitterId, Surface};
 use crate::spectrum::Spectrum;
 use glam::Vec3;
 
@@ -23,7 +23,9 @@ pub struct LightVertex {
     pub class: Positions,
     /// The vertex next to the light scattered by a Dirac event.
     pub first_delta: bool,
-    /// The light cannot be hit.
+    /// Where the light comes from.
+    pub emitter: EmitterId,
+    /// It cannot be hit.
     pub light_delta: bool,
 }
 

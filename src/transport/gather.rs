@@ -119,7 +119,8 @@ fn finish<R: Record, O: Observe>(
     tally: &mut Tally<'_, R, O>,
 ) {
     if cx.plan.settings.paths.accepts(&path) {
-        tally.record.gathered(Contribution { value, length: join.length, light_vertices, technique: join.technique });
+        let Join { weight, length, technique, emitter, .. } = join;
+        tally.record.gathered(Contribution { value, weight, length, light_vertices, technique, emitter });
         tally.observe.joined(join);
     }
 }
@@ -200,6 +201,7 @@ fn hit<R: Record, O: Observe>(
         weight,
         length,
         light: Some(point),
+        emitter: point.emitter,
         light_delta: false,
         light_vertex: 0,
         lens: Vec3::ZERO,
@@ -256,6 +258,7 @@ fn next_event<R: Record, O: Observe>(
         weight,
         length,
         light: Some(&ne.point),
+        emitter: ne.point.emitter,
         light_delta: ne.delta,
         light_vertex: 0,
         lens: Vec3::ZERO,
@@ -329,6 +332,7 @@ fn connect<R: Record, O: Observe>(
             weight,
             length,
             light: None,
+            emitter: y.emitter,
             light_delta: y.light_delta,
             light_vertex: picked as usize,
             lens: Vec3::ZERO,

@@ -28,6 +28,7 @@ pub mod vertex;
 pub mod walk;
 
 use crate::math::Random;
+use crate::scene::EmitterId;
 use crate::spectrum::Spectrum;
 use glam::Vec2;
 
@@ -50,12 +51,16 @@ pub enum Technique {
 pub struct Contribution {
     /// Estimate of the pixel's measurement by this path, MIS weight included.
     pub value: Spectrum,
+    /// That weight; the value without it is the estimate of the join alone.
+    pub weight: f32,
     /// Length in edges.
     pub length: u32,
     /// Number of vertices made by the shooting walker (s), light point included.
     pub light_vertices: u32,
     /// The join.
     pub technique: Technique,
+    /// Where the light comes from.
+    pub emitter: EmitterId,
 }
 
 /// Receives what the walks find. Gathered paths belong to the pixel being sampled.

@@ -11,6 +11,7 @@ use super::walk::{Context, Join, Observe, Tally, Walk, end, free, spawn};
 use super::{Contribution, Record, Technique};
 use crate::local::Equation;
 use crate::math::Random;
+use crate::scene::EmitterId;
 use crate::scene::emitter::Emission;
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::scene::sensor::SensorConnection;
@@ -93,7 +94,7 @@ pub fn emit<R: Record, O: Observe>(
         let partial = walk.partial(h, arrival, count);
         if !vertex.closure.is_delta() {
             if plan.settings.techniques.splat && (length > 1 || plan.splat_direct) {
-                splat(cx, &walk, &vertex, partial, start.delta, random, tally);
+                splat(cx, &walk, &vertex, partial, start, random, tally);
             }
             if let Some(cache) = cache.as_mut()
                 && length + 2 <= plan.settings.max_length
@@ -106,6 +107,7 @@ pub fn emit<R: Record, O: Observe>(
                     length,
                     class: walk.class,
                     first_delta: walk.first_delta,
+                    emitter: start.point.emitter,
                     light_delta: start.delta,
                 });
                 if let Some(v) = cache.last() {
@@ -138,7 +140,7 @@ fn splat<R: Record, O: Observe>(
     walk: &Walk,
     vertex: &Vertex<'_>,
     partial: Partial<f32>,
-    light_delta: bool,
+    start: &Emission,
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
@@ -167,10 +169,10 @@ fn splat<R: Record, O: Observe>(
         length,
         first_delta: false,
         last_delta: walk.first_delta,
-        light_delta,
+        light_delta: start.delta,
     };
     let lens = vertex.surface.p + c.w / c.inv_d2.sqrt();
-    finish(cx, path, c, value, (weight, lens), random, tally);
+    finish(cx, path, c, (value, weight, start.point.emitter), lens, random, tally);
 }
 
 /// The lens sees a light point: paths of length 1 where hits are off.
@@ -205,7 +207,7 @@ fn splat_emitter<R: Record, O: Observe>(cx: Context<'_>, random: &mut Random, ta
         last_delta: false,
         light_delta: false,
     };
-    finish(cx, path, c, value, (1.0, c.end), random, tally);
+    finish(cx, path, c, (value, 1.0, point.emitter), c.end, random, tally);
 }
 
 /// Hands on a finished path if it counts.
@@ -214,20 +216,22 @@ fn finish<R: Record, O: Observe>(
     cx: Context<'_>,
     path: Finished,
     c: SensorConnection,
-    value: Spectrum,
-    (weight, lens): (f32, Vec3),
+    (value, weight, emitter): (Spectrum, f32, EmitterId),
+    lens: Vec3,
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
     if cx.plan.settings.paths.accepts(&path) {
         let (technique, length) = (Technique::Splat, path.length);
         // The lens is the one vertex that shooting did not make.
-        tally.record.splatted(c.raster, random, Contribution { value, length, light_vertices: length, technique });
+        let contribution = Contribution { value, weight, length, light_vertices: length, technique, emitter };
+        tally.record.splatted(c.raster, random, contribution);
         tally.observe.joined(Join {
             technique,
             weight,
             length,
             light: None,
+            emitter,
             light_delta: path.light_delta,
             light_vertex: 0,
             lens,

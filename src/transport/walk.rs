@@ -15,7 +15,7 @@ use crate::local::Equation;
 use crate::math::Random;
 use crate::scene::emitter::{Emission, EmitterPoint, NextEvent};
 use crate::scene::geometry::{End, Ray, offset_origin};
-use crate::scene::{Scene, Surface};
+use crate::scene::{EmitterId, Scene, Surface};
 use crate::spectrum::Spectrum;
 use glam::Vec3;
 
@@ -172,7 +172,9 @@ pub struct Join<'a> {
     pub length: u32,
     /// The light point, where the join made or found it.
     pub light: Option<&'a EmitterPoint>,
-    /// That light point cannot be hit.
+    /// The emitter that the path starts from.
+    pub emitter: EmitterId,
+    /// It cannot be hit.
     pub light_delta: bool,
     /// Index in the cache of the light vertex of a connection.
     pub light_vertex: usize,

@@ -1,10 +1,8 @@
 //! Terms of the Neumann series as layers of one render.
 
-use crate::support::{ROOM, rendered, scene, sums, sums_of};
+use crate::support::{ESTIMATORS, ROOM, rendered, scene, sphere, sums, sums_of};
 use nephroid::render::{Estimator, Options, Partition};
 use nephroid::scene::Scene;
-
-const ESTIMATORS: [Estimator; 3] = [Estimator::Gather, Estimator::Shoot, Estimator::Bidirectional];
 
 fn options(world: &Scene, estimator: Estimator, last: u32) -> Options {
     let mut options = Options::for_scene(world, estimator);
@@ -86,24 +84,8 @@ fn a8_toy_scene_term_by_term() {
 /// same everywhere, aⁿ · avg(Lᵉ).
 #[test]
 fn a17_layers_of_a_sphere_with_any_emission() {
-    let dir = tempfile::tempdir().unwrap();
-    // Constant along each meridian, so that the mean over the sphere is that over the texels.
-    let texels = [0u8, 255, 30, 0, 0, 90, 0, 200];
-    image::GrayImage::from_fn(8, 1, |x, _| image::Luma([texels[x as usize]])).save(dir.path().join("lamps.png")).unwrap();
-    let average = texels.iter().map(|t| f64::from(*t) / 255.0).sum::<f64>() / 8.0;
     let albedo = 0.6;
-    let world = scene(&format!(
-        r#"<scene version="3.0.0">
-  <sensor type="perspective"><float name="fov" value="60"/>
-    <transform name="to_world"><lookat origin="0.3, 0.1, 0.4" target="0, 0, -1" up="0, 1, 0"/></transform>
-    <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
-  <shape type="sphere"><boolean name="flip_normals" value="true"/>
-    <bsdf type="diffuse"><rgb name="reflectance" value="{albedo}"/></bsdf>
-    <emitter type="area"><texture type="bitmap" name="radiance"><string name="filename" value="{}/lamps.png"/>
-      <boolean name="raw" value="true"/><string name="filter_type" value="nearest"/></texture></emitter></shape>
-</scene>"#,
-        dir.path().display()
-    ));
+    let (world, average) = sphere(albedo);
     for estimator in ESTIMATORS {
         let mut options = options(&world, estimator, 6);
         options.settings.max_length = 7;

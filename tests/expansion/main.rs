@@ -1,4 +1,6 @@
 //! The expansion Σ τⁿLᵉ taken apart: layers, techniques and lights of one render, and what is left out of it.
 
 mod layers;
+mod lights;
+mod pyramid;
 mod support;

@@ -182,7 +182,11 @@ fn shape(b: &mut Builder, index: NodeIndex) -> Option<ShapeDescription> {
     let given = b.given(index)?;
     let g = &given;
     let bsdf = g.objects(Tag::Bsdf).next().map(|(node, _)| bsdfs::build(b, node));
-    let emission = g.objects(Tag::Emitter).next().and_then(|(node, place)| emitters::area(b, node, place));
+    let mut emission = g.objects(Tag::Emitter).next().and_then(|(node, place)| emitters::area(b, node, place));
+    if let Some(emission) = &mut emission {
+        // A lamp is known by its shape where its emitter has no name.
+        emission.id = emission.id.take().or_else(|| b.id(index));
+    }
     let to_world = b.transform(g, "to_world");
     let instance = g.plugin.name == "instance";
     let flip_normals = !instance && b.boolean(g, "flip_normals");
