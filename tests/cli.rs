@@ -434,3 +434,29 @@ fn pyramid_and_light_groups_of_one_render() {
     let (code, _, err) = run(nephroid().arg("render").arg(&scene).args(["--light-groups=x=sun", "-o"]).arg(&image));
     assert!(code == 2 && err.contains("moon"), "{err}");
 }
+
+#[test]
+fn local_and_recursive_say_what_they_leave_out() {
+    let room = Room::new();
+    let (image, rest) = (room.path("a.exr"), room.path("rest.exr"));
+    for estimator in ["local", "local-unshadowed", "recursive"] {
+        let mut command = nephroid();
+        command.arg("render").arg(room.scene()).args(["--estimator", estimator, "-o"]).arg(&image);
+        let (code, _, err) = run(command.arg("--left-out").arg(&rest));
+        assert_eq!(code, 0, "{err}");
+        let (part, rest) = (read_image(&image).expect("an image"), read_image(&rest).expect("the rest"));
+        let mean = |f: &ImageFile| f.rgb("").expect("colours").iter().map(|p| p[0]).sum::<f32>();
+        assert!(mean(&rest) > 0.0 && mean(&rest) < mean(&part), "{estimator}: light bounces between floor and lamp");
+        assert!(rest.rgb("variance").is_some());
+    }
+    for wrong in [
+        vec!["--left-out", "r.exr"],
+        vec!["--estimator", "local", "--techniques", "hit"],
+        vec!["--estimator", "recursive", "--left-out", "r.exr", "--paths", "E D L"],
+    ] {
+        let mut command = nephroid();
+        command.current_dir(room.directory.path()).arg("render").arg(room.scene()).args(["-o", "b.exr"]);
+        let (code, _, err) = run(command.args(&wrong));
+        assert_eq!(code, 2, "{wrong:?}: {err}");
+    }
+}

@@ -69,6 +69,12 @@ pub enum EstimatorName {
     Bidirectional,
     /// What the scene's integrator element asks for.
     Scene,
+    /// Lights alone, no coupling between surfaces.
+    Local,
+    /// The same without shadows.
+    LocalUnshadowed,
+    /// Ideal reflections and refractions followed, everything else lit by lights alone (recursive ray tracing).
+    Recursive,
     /// Diffuse scenes as a matrix equation, solved by elimination.
     Invert,
     /// Diffuse scenes as a matrix equation, solved by --iteration.
@@ -202,6 +208,9 @@ pub struct LayersArgs {
     /// Write a contact sheet of the terms and of their partial sums.
     #[arg(long, value_name = "OUT.png", value_hint = ValueHint::FilePath)]
     pub gallery: Option<PathBuf>,
+    /// Write the image of what --estimator local or recursive leaves out of the full solution.
+    #[arg(long, value_name = "OUT", value_hint = ValueHint::FilePath)]
+    pub left_out: Option<PathBuf>,
     /// Write into this directory what every join adds to every path length, raw and weighted: images, a
     /// table and contact sheets.
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]

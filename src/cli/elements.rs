@@ -66,7 +66,7 @@ pub fn method(args: &RenderArgs) -> Option<Method> {
             IterationName::Southwell => Method::Iterate(Iteration::Southwell),
             IterationName::Stochastic => Method::Stochastic,
         }),
-        EstimatorName::Gather | EstimatorName::Shoot | EstimatorName::Bidirectional | EstimatorName::Scene => None,
+        _ => None,
     }
 }
 

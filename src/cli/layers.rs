@@ -30,6 +30,10 @@ pub fn check(args: &RenderArgs) -> Result<(), Failure> {
         }
         check_writable(path).map_err(|f| Failure::output(f.to_string()))?;
     }
+    if let Some(path) = &args.layers.left_out {
+        OutputFormat::of(path).map_err(|f| Failure::usage(f.to_string()))?;
+        check_writable(path).map_err(|f| Failure::output(f.to_string()))?;
+    }
     if let Some(directory) = &args.layers.pyramid {
         let made = std::fs::create_dir_all(directory).map_err(|e| crate::io::fault::reason(&e));
         let made = made.and_then(|()| output::check_directory(&directory.join("pyramid.json")));
@@ -45,7 +49,11 @@ pub fn check(args: &RenderArgs) -> Result<(), Failure> {
 
 /// Whether anything is asked that only walks can give.
 pub fn wanted(args: &LayersArgs) -> bool {
-    args.layers.is_some() || args.gallery.is_some() || args.pyramid.is_some() || args.light_groups.is_some()
+    args.layers.is_some()
+        || args.gallery.is_some()
+        || args.pyramid.is_some()
+        || args.light_groups.is_some()
+        || args.left_out.is_some()
 }
 
 /// How the render is to be taken apart.

@@ -6,16 +6,19 @@ use super::output::{self, Outputs};
 use super::progress::ProgressLine;
 use super::units::{show_count, show_duration};
 use super::{Exit, Failure, elements, interrupt, layers, tell};
+use crate::io::exr::ImageFile;
 use crate::io::fault::{Fault, reason};
-use crate::io::write::write_atomic;
-use crate::render::{Budget, Control, Estimator, Options, Outcome, Render};
+use crate::io::png::PngOptions;
+use crate::io::write::{write_atomic, write_image};
+use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Render, left_out};
 use crate::scene::Scene;
 use crate::transport::class::PathFilter;
 use crate::transport::mis::Heuristic;
-use crate::transport::settings::Techniques;
+use crate::transport::settings::{Coupling, Techniques};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Time between images written during a render; more where writing takes long.
@@ -44,6 +47,21 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
         tell(&opened.problems.render(&opened.description.sources));
     }
     let (estimator, mut options) = options(&opened, args);
+    let all = options.settings.coupling == Coupling::All;
+    if args.transport.techniques.is_some() && !all {
+        return Err(Failure::usage(format!("--estimator {} has no --techniques to choose from", estimator.name())));
+    }
+    if args.layers.left_out.is_some() && (all || !paths.accepts_all()) {
+        let what = if all {
+            "--left-out belongs to --estimator local, local-unshadowed or recursive"
+        } else {
+            "--left-out takes no --paths"
+        };
+        return Err(Failure::usage(what));
+    }
+    if all && !args.quiet && !opened.scene.lights.ambient().is_empty() {
+        tell("warning: the ambient light has no effect: only --estimator local, local-unshadowed and recursive know it\n");
+    }
     options.settings.paths = paths;
     let (shortest, longest) = (options.settings.min_length, options.settings.max_length);
     if shortest > longest {
@@ -80,7 +98,7 @@ pub(super) fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(
         film.crop = Some([x, y, w, h]);
     }
     let [_, _, width, height] = film.crop.unwrap_or([0, 0, film.width, film.height]);
-    let shoots = args.estimator != EstimatorName::Gather && elements::method(args).is_none();
+    let shoots = matches!(args.estimator, EstimatorName::Shoot | EstimatorName::Bidirectional | EstimatorName::Scene);
     let needed = output::memory_needed(width, height, args.transport.light_paths, shoots);
     output::check_memory(needed, args.max_memory, [width, height])
 }
@@ -91,6 +109,9 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
         // Those of finite elements have no walks and do not come here.
         EstimatorName::Gather | EstimatorName::Invert | EstimatorName::Iterate => Estimator::Gather,
         EstimatorName::Shoot => Estimator::Shoot,
+        EstimatorName::Local => Estimator::Local,
+        EstimatorName::LocalUnshadowed => Estimator::LocalUnshadowed,
+        EstimatorName::Recursive => Estimator::Recursive,
         EstimatorName::Bidirectional => Estimator::Bidirectional,
         EstimatorName::Scene => Estimator::of_integrator(&opened.description.integrator.name),
     };
@@ -204,6 +225,9 @@ impl Job<'_> {
     fn finish(&self, render: &Render, scene: &Scene) -> Result<Exit, Failure> {
         let mut faults = self.write(render, scene);
         faults.extend(layers::write(self.args, render));
+        if let Some(path) = &self.args.layers.left_out {
+            faults.extend(self.write_left_out(path, scene)?.err());
+        }
         if let Some(path) = &self.args.stats {
             let text = serde_json::to_string_pretty(&self.figures(render, scene)).unwrap_or_default() + "\n";
             let written = write_atomic(path, |out| out.write_all(text.as_bytes()).map_err(|e| Fault::new(reason(&e))));
@@ -217,6 +241,17 @@ impl Job<'_> {
             return Err(Failure { exit: Exit::Output, message });
         }
         Ok(if interrupt::asked() { Exit::Interrupted } else { Exit::Done })
+    }
+
+    /// Renders and writes the paths that recursion leaves out, with as many passes.
+    fn write_left_out(&self, path: &Path, scene: &Scene) -> Result<Result<(), Fault>, Failure> {
+        let passes = self.budget.passes.unwrap_or(DEFAULT_SPP);
+        let stop = |_: &Progress| if interrupt::asked() { Control::Stop } else { Control::Continue };
+        let rest = left_out(scene, &self.options, passes, stop).map_err(|e| Failure::usage(e.to_string()))?;
+        let mut file = ImageFile::new(rest.width, rest.height);
+        file.insert_rgb("", &rest.mean);
+        file.insert_rgb("variance", &rest.variance);
+        Ok(write_image(path, &file, PngOptions { exposure: self.args.exposure, ..PngOptions::default() }))
     }
 
     fn summary(&self, render: &Render) -> String {

@@ -467,6 +467,11 @@ pub enum EmitterModel {
         /// W·m⁻²·sr⁻¹.
         radiance: [f32; 3],
     },
+    /// The same radiance from everywhere and through everything; no light of the rendering equation.
+    Ambient {
+        /// W·m⁻²·sr⁻¹.
+        radiance: [f32; 3],
+    },
     /// Latitude–longitude image.
     Envmap {
         /// Which image.

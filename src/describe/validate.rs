@@ -224,7 +224,7 @@ impl Check<'_> {
                 self.light(*irradiance, place, "irradiance");
                 self.need((0.0..180.0).contains(angle), place, "angular_diameter", angle, "lie between 0 and 180 degrees");
             }
-            EmitterModel::Constant { radiance } => self.light(*radiance, place, "radiance"),
+            EmitterModel::Constant { radiance } | EmitterModel::Ambient { radiance } => self.light(*radiance, place, "radiance"),
             EmitterModel::Envmap { image, scale, to_world } => {
                 self.index(image.0, self.scene.images.len(), place, "image");
                 self.need(scale.is_finite() && *scale >= 0.0, place, "scale", scale, "be finite and not negative");

@@ -9,6 +9,7 @@ use super::{
     Equation, Evaluation, Lobe, Lobes, Sample, Textured, conductor, dielectric, diffuse, null, plastic, rough_conductor,
     rough_dielectric, rough_plastic, thin_dielectric,
 };
+use crate::math::warp::ONE_MINUS_EPSILON;
 use crate::spectrum::Spectrum;
 use crate::texture::Textures;
 use glam::{Vec2, Vec3};
@@ -110,6 +111,21 @@ macro_rules! closed_set {
                     $(Self::$name(lobe) => lobe.sample(equation, w_back, u_lobe, u),)*
                     Self::Composite(lobes) => lobes.sample(equation, w_back, u_lobe, u),
                 }
+            }
+
+            /// Every Dirac event; its weight times its probability is the coefficient of the Dirac function.
+            pub fn each_dirac(&self, equation: Equation, w_back: Vec3, f: impl FnMut(Sample)) {
+                match self {
+                    Self::Composite(lobes) => lobes.each_dirac(equation, w_back, f),
+                    _ => self.two_dirac(equation, w_back).for_each(f),
+                }
+            }
+
+            /// The same of one model, which has at most two, at either end of the choice of lobes.
+            pub(super) fn two_dirac(&self, equation: Equation, w_back: Vec3) -> impl Iterator<Item = Sample> {
+                let at = |u_lobe| self.sample(equation, w_back, u_lobe, Vec2::splat(0.5)).filter(|s| s.delta);
+                let (first, last) = (at(0.0), at(ONE_MINUS_EPSILON));
+                last.filter(|l| first.is_none_or(|s| s.w_next != l.w_next)).into_iter().chain(first)
             }
 
             /// Least roughness of its lobes: 0 for Dirac, α of facets (at most 1), 1 for diffuse.

@@ -132,6 +132,14 @@ impl<'a> Composite<'a> {
         Some(Sample { weight: e.f * (sample.w_next.z.abs() / e.p_w), p: e.p_w, p_rev: e.p_w_rev, ..sample })
     }
 
+    /// Every Dirac event of every lobe.
+    pub fn each_dirac(&self, equation: Equation, w_back: Vec3, mut f: impl FnMut(Sample)) {
+        for (entry, weight) in self.lobes() {
+            let closure = self.resolve(entry);
+            closure.two_dirac(equation, w_back).for_each(|s| f(Sample { p: s.p * weight, p_rev: s.p_rev * weight, ..s }));
+        }
+    }
+
     /// No lobe has anything but Dirac events.
     pub fn is_delta(&self) -> bool {
         self.lobes().all(|(entry, _)| !entry.smooth)

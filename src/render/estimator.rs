@@ -3,7 +3,10 @@
 use super::Partition;
 use crate::scene::Scene;
 use crate::transport::mis::Heuristic;
-use crate::transport::settings::{Settings, Techniques};
+use crate::transport::settings::{Coupling, Settings, Techniques};
+
+/// Longest path of recursive ray tracing, unless somebody says.
+const RECURSION: u32 = 16;
 
 /// How the measurement is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -15,11 +18,17 @@ pub enum Estimator {
     /// Both, weighted: bidirectional path tracing [Veach 1997].
     #[default]
     Bidirectional,
+    /// No coupling: lights alone, seen where nothing is between.
+    Local,
+    /// No coupling, no visibility.
+    LocalUnshadowed,
+    /// Ideal reflections and refractions followed [Whitted 1980].
+    Recursive,
 }
 
 impl Estimator {
     /// Names on the command line.
-    pub const NAMES: [&str; 3] = ["gather", "shoot", "bidirectional"];
+    pub const NAMES: [&str; 6] = ["gather", "shoot", "bidirectional", "local", "local-unshadowed", "recursive"];
 
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -27,12 +36,16 @@ impl Estimator {
             Self::Gather => "gather",
             Self::Shoot => "shoot",
             Self::Bidirectional => "bidirectional",
+            Self::Local => "local",
+            Self::LocalUnshadowed => "local-unshadowed",
+            Self::Recursive => "recursive",
         }
     }
 
     /// By name.
     pub fn parse(name: &str) -> Option<Self> {
-        [Self::Gather, Self::Shoot, Self::Bidirectional].into_iter().find(|e| e.name() == name)
+        let all = [Self::Gather, Self::Shoot, Self::Bidirectional, Self::Local, Self::LocalUnshadowed, Self::Recursive];
+        all.into_iter().find(|e| e.name() == name)
     }
 
     /// What an integrator element of a scene file means by its name.
@@ -44,10 +57,29 @@ impl Estimator {
         }
     }
 
+    /// What it follows between surfaces.
+    pub fn coupling(self) -> Coupling {
+        match self {
+            Self::Gather | Self::Shoot | Self::Bidirectional => Coupling::All,
+            Self::Recursive => Coupling::Specular,
+            Self::Local => Coupling::None { shadows: true },
+            Self::LocalUnshadowed => Coupling::None { shadows: false },
+        }
+    }
+
+    /// Longest path where the scene does not say: recursion doubles its work with each edge.
+    fn longest(self) -> u32 {
+        match self.coupling() {
+            Coupling::All => u32::MAX,
+            Coupling::Specular => RECURSION,
+            Coupling::None { .. } => 2,
+        }
+    }
+
     /// Its joins.
     pub fn techniques(self) -> Techniques {
         match self {
-            Self::Gather => Techniques::GATHER,
+            Self::Gather | Self::Local | Self::LocalUnshadowed | Self::Recursive => Techniques::GATHER,
             Self::Shoot => Techniques::SHOOT,
             Self::Bidirectional => Techniques::BIDIRECTIONAL,
         }
@@ -73,7 +105,8 @@ impl Options {
         let i = &scene.integrator;
         let settings = Settings {
             techniques: estimator.techniques(),
-            max_length: i.max_depth.unwrap_or(u32::MAX),
+            coupling: estimator.coupling(),
+            max_length: i.max_depth.unwrap_or(u32::MAX).min(estimator.longest()),
             rr_depth: i.rr_depth,
             hide_emitters: i.hide_emitters,
             ..Settings::default()
@@ -89,6 +122,7 @@ impl Options {
         h.update(&scene.hash());
         h.update(&[u8::from(t.hit), u8::from(t.next_event), u8::from(t.splat), u8::from(t.connect)]);
         h.update(&[u8::from(s.heuristic == Heuristic::Power), u8::from(s.hide_emitters), u8::from(s.guided)]);
+        h.update(format!("{:?}", s.coupling).as_bytes());
         for n in [s.min_length, s.max_length, s.rr_depth, s.connections] {
             h.update(&n.to_le_bytes());
         }

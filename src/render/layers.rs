@@ -181,7 +181,7 @@ impl LightGroups {
     /// Every emitter that shines by itself, named by its id, or by its kind and number.
     pub fn each(emitters: &[EmitterInfo]) -> Result<Self, String> {
         let mut out = Self { names: Vec::new(), group: vec![0; emitters.len()] };
-        for (i, e) in emitters.iter().enumerate().filter(|(_, e)| e.prob_next_event > 0.0) {
+        for (i, e) in emitters.iter().enumerate().filter(|(_, e)| e.prob_next_event > 0.0 || e.kind == "ambient") {
             out.group[i] = out.names.len() as u16;
             let name = e.id.clone().unwrap_or_else(|| format!("{}{i}", e.kind));
             out.add_name(&name)?;
@@ -216,12 +216,15 @@ impl LightGroups {
             }
             out.add_name(name.trim())?;
         }
+        let other = out.names.len() as u16;
+        if other == 0 {
+            return Err("no group is named".into());
+        }
         if group.iter().any(Option::is_none) {
             out.add_name("other")?;
         }
-        let other = out.names.len().saturating_sub(1) as u16;
         out.group = group.into_iter().map(|g| g.unwrap_or(other)).collect();
-        if out.names.is_empty() { Err("no group is named".into()) } else { Ok(out) }
+        Ok(out)
     }
 
     /// Names of the groups.

@@ -18,6 +18,7 @@
 mod estimator;
 mod known;
 pub mod layers;
+mod left_out;
 mod measure;
 mod passes;
 mod pilot;
@@ -26,6 +27,7 @@ mod sink;
 pub use estimator::{Estimator, Options};
 pub use known::film_of;
 pub use layers::{Layers, Partition};
+pub use left_out::left_out;
 pub use measure::{Measurement, PixelMeasurement, measure};
 pub use passes::SHOOT_JOB;
 

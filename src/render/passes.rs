@@ -7,6 +7,8 @@ use crate::math::Random;
 use crate::math::random::Family;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
+use crate::transport::recursive::recursive;
+use crate::transport::settings::Coupling;
 use crate::transport::shoot::shoot;
 use crate::transport::walk::{Context, Tally};
 use crate::transport::{Contribution, RayCounts, Record};
@@ -149,7 +151,12 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
                         let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
                         let mut record = PixelRecord { sink: &mut sink, local };
                         let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
-                        gather(cx, raster, weight, cache, &mut random, &mut tally);
+                        let (r, t) = (&mut random, &mut tally);
+                        match plan.settings.coupling {
+                            Coupling::All => gather(cx, raster, weight, cache, r, t),
+                            Coupling::Specular => recursive(cx, raster, weight, true, r, t),
+                            Coupling::None { shadows } => recursive(cx, raster, weight, shadows, r, t),
+                        }
                     }
                 }
                 sink.commit(&mut tiles);

@@ -7,7 +7,7 @@ use crate::io::exr::ImageFile;
 use embedded_graphics::Drawable;
 use embedded_graphics::draw_target::DrawTarget;
 use embedded_graphics::geometry::{OriginDimensions, Point, Size};
-use embedded_graphics::mono_font::{MonoTextStyle, ascii::FONT_8X13};
+use embedded_graphics::mono_font::{MonoTextStyle, ascii::FONT_6X13};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::text::{Baseline, Text};
 
@@ -48,7 +48,7 @@ impl Cell {
     }
 
     fn text(&self) -> String {
-        if self.stops > 0 { format!("{} (+{} EV)", self.label, self.stops) } else { self.label.clone() }
+        if self.stops > 0 { format!("{} +{} EV", self.label, self.stops) } else { self.label.clone() }
     }
 }
 
@@ -134,9 +134,9 @@ impl Canvas {
 
     /// As much of a text as has room.
     fn text(&mut self, text: &str, [x, y]: [u32; 2], room: u32) {
-        let fits = (room / FONT_8X13.character_size.width) as usize;
+        let fits = (room / FONT_6X13.character_size.width) as usize;
         let shown: String = text.chars().take(fits).collect();
-        let style = MonoTextStyle::new(&FONT_8X13, BinaryColor::On);
+        let style = MonoTextStyle::new(&FONT_6X13, BinaryColor::On);
         // Drawing cannot fail: the error type of the canvas has no values.
         let _ = Text::with_baseline(&shown, Point::new(x as i32, y as i32), style, Baseline::Top).draw(self);
     }
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn dark_pictures_are_brightened_and_say_so() {
         let cell = Cell::brightened("n = 3", vec![[0.1; 3]; 100], 0.0);
-        assert_eq!((cell.stops, cell.text().as_str()), (3, "n = 3 (+3 EV)"));
+        assert_eq!((cell.stops, cell.text().as_str()), (3, "n = 3 +3 EV"));
         assert_eq!(Cell::brightened("n = 0", vec![[7.0; 3]; 100], 0.0).stops, 0);
         assert_eq!(Cell::brightened("black", vec![[0.0; 3]; 100], 0.0).text(), "black");
     }

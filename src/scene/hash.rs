@@ -189,6 +189,7 @@ enums! {
         Spot { to_world, intensity, cutoff_angle_deg, beam_width_deg, texture }
         Directional { direction, irradiance, angular_diameter_deg }
         Constant { radiance }
+        Ambient { radiance }
         Envmap { image, scale, to_world }
     }
 }

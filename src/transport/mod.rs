@@ -13,6 +13,7 @@
 //! - [`vertex`]: the one kernel of both equations.
 //! - [`walk`]: one step of either walker.
 //! - [`gather`], [`shoot`]: the two walks, alike on purpose.
+//! - [`recursive`]: part of the coupling, or none: recursive ray tracing, local illumination.
 //! - [`cache`]: light vertices kept for connections.
 //! - [`mod@reference`]: the same weights the slow way, for tests.
 
@@ -21,6 +22,7 @@ pub mod class;
 pub mod gather;
 pub mod mis;
 pub mod mutant;
+pub mod recursive;
 pub mod reference;
 pub mod settings;
 pub mod shoot;

@@ -55,11 +55,28 @@ impl Techniques {
     }
 }
 
+/// How much of the coupling between surfaces is followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coupling {
+    /// All of it.
+    #[default]
+    All,
+    /// Ideal reflection and refraction: see [`super::recursive`].
+    Specular,
+    /// None: lights alone, `shadows` with visibility.
+    None {
+        /// Lights are seen only where nothing is between.
+        shadows: bool,
+    },
+}
+
 /// Everything that decides what is estimated and by which joins.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Joins that are allowed.
     pub techniques: Techniques,
+    /// What is followed between surfaces.
+    pub coupling: Coupling,
     /// From densities to weights.
     pub heuristic: Heuristic,
     /// Shortest path in edges.
@@ -86,6 +103,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             techniques: Techniques::BIDIRECTIONAL,
+            coupling: Coupling::All,
             heuristic: Heuristic::default(),
             min_length: 1,
             max_length: u32::MAX,
@@ -143,7 +161,10 @@ impl Plan {
         let n = if t.splat { light_paths as f32 } else { 0.0 };
         let normaliser = if planted(Mutant::SplatCropNormalisation) { film_pixels } else { light_paths };
         let mut settings = settings.clone();
-        settings.max_length = settings.max_length.min(LONGEST_PATH);
+        settings.max_length = settings.max_length.min(match settings.coupling {
+            Coupling::All | Coupling::Specular => LONGEST_PATH,
+            Coupling::None { .. } => 2,
+        });
         Self {
             light_paths,
             n,

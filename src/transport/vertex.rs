@@ -10,7 +10,7 @@
 //! and geometric normal disagree about the side scatters nothing, for both walkers alike.
 
 use super::mutant::{Mutant, planted};
-use crate::local::{Closure, Equation};
+use crate::local::{Closure, Equation, Sample};
 use crate::math::Frame;
 use crate::scene::{Scene, Surface};
 use crate::spectrum::Spectrum;
@@ -115,7 +115,21 @@ impl<'a> Vertex<'a> {
     /// Samples the next direction.
     #[inline]
     pub fn scatter(&self, equation: Equation, u_lobe: f32, u: glam::Vec2) -> Option<Scatter> {
-        let s = self.closure.sample(equation, self.back, u_lobe, u)?;
+        self.scattered(equation, self.closure.sample(equation, self.back, u_lobe, u)?)
+    }
+
+    /// Every Dirac event: its direction and its coefficient, lobes that share a direction apart.
+    #[inline]
+    pub fn each_dirac(&self, equation: Equation, mut f: impl FnMut(Vec3, Spectrum)) {
+        self.closure.each_dirac(equation, self.back, |s| {
+            if let Some(s) = self.scattered(equation, s) {
+                f(s.w_next, s.weight * s.p);
+            }
+        });
+    }
+
+    #[inline]
+    fn scattered(&self, equation: Equation, s: Sample) -> Option<Scatter> {
         // Straight through: the direction must not pick up rounding, nor be subject to sides.
         let straight = s.delta && s.w_next == -self.back;
         let w_next = if straight { -self.w_back } else { self.frame.to_world(s.w_next) };

@@ -65,5 +65,5 @@ fn groups_by_name() {
     assert_eq!(LightGroups::parse("x y=bu*", infos).unwrap().names(), ["x_y", "other"]);
     let fault = LightGroups::parse("a=lamp", infos).unwrap_err();
     assert!(fault.contains("`lamp`") && fault.contains("panel, bulb"), "{fault}");
-    assert!(LightGroups::parse("panel", infos).is_err());
+    assert!(LightGroups::parse("panel", infos).is_err() && LightGroups::parse("", infos).is_err());
 }

@@ -2,5 +2,6 @@
 
 mod layers;
 mod lights;
+mod partial;
 mod pyramid;
 mod support;

@@ -96,6 +96,17 @@ pub const EMITTERS: &[Plugin] = &[
     },
     Plugin {
         tag: Tag::Emitter,
+        name: "ambient",
+        doc: "The same radiance at every point from all directions, whatever is in the way (not in Mitsuba). It stands for all that local \
+illumination and recursive ray tracing leave out, and is known to them alone (`--estimator local`, `local-unshadowed`, \
+`recursive`): every surface reflects its albedo times the radiance, except as a mirror.",
+        properties: &[&[optional("radiance", Kind::Colour, "1", "W·m⁻²·sr⁻¹")], COMMON],
+        example: r#"<emitter type="ambient">
+    <rgb name="radiance" value="0.1"/>
+</emitter>"#,
+    },
+    Plugin {
+        tag: Tag::Emitter,
         name: "envmap",
         doc: "A latitude–longitude image of the radiance from all directions; the upper edge is +y.",
         properties: &[
@@ -161,6 +172,7 @@ fn model(b: &mut Builder, given: &Given) -> Option<EmitterModel> {
             let irradiance = b.colour(g, "irradiance");
             EmitterModel::Directional { direction, irradiance, angular_diameter_deg: b.float(g, "angular_diameter") }
         }
+        "ambient" => EmitterModel::Ambient { radiance: b.colour(g, "radiance") },
         "constant" => EmitterModel::Constant { radiance: b.colour(g, "radiance") },
         "envmap" => {
             let (scale, to_world) = (b.float(g, "scale"), b.transform(g, "to_world"));

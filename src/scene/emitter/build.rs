@@ -62,6 +62,9 @@ impl Lights {
             powers.push(lights.push(emitter, "area", &emission.id, power, emission.place, problems));
         }
         for other in others {
+            if let EmitterModel::Ambient { radiance } = &other.model {
+                lights.ambient.push((EmitterId(lights.emitters.len() as u32), colour(*radiance)));
+            }
             let (emitter, power) = lights.other(other, images, problems);
             powers.push(lights.push(emitter, kind_of(&other.model), &other.id, power, other.place, problems));
         }
@@ -144,6 +147,8 @@ impl Lights {
             EmitterModel::Directional { direction, irradiance, angular_diameter_deg } => {
                 self.directional(*direction, colour(*irradiance), *angular_diameter_deg, place, problems)
             }
+            // No light of the two equations.
+            EmitterModel::Ambient { .. } => None,
             EmitterModel::Constant { radiance } => Some(self.sky(Sky::Constant(colour(*radiance)))),
             EmitterModel::Envmap { image, scale, to_world } => {
                 envmap(*image, *scale, to_world, images, place, problems).map(|sky| self.sky(sky))
@@ -237,6 +242,7 @@ fn kind_of(model: &EmitterModel) -> &'static str {
         EmitterModel::Point { .. } => "point",
         EmitterModel::Spot { .. } => "spot",
         EmitterModel::Directional { .. } => "directional",
+        EmitterModel::Ambient { .. } => "ambient",
         EmitterModel::Constant { .. } => "constant",
         EmitterModel::Envmap { .. } => "envmap",
     }

@@ -17,6 +17,8 @@ pub struct Lights {
     pub(super) textures: Textures,
     /// Emitters at infinity that can be hit.
     pub(super) skies: Vec<EmitterId>,
+    /// Ambient terms of local illumination.
+    pub(super) ambient: Vec<(EmitterId, Spectrum)>,
     pub(super) choice: Option<Choice>,
     /// Centre of the sphere around the scene.
     pub(super) center: Vec3,
@@ -288,6 +290,12 @@ impl Lights {
                 }
             }
         }
+    }
+
+    /// Ambient radiance: an abstraction that only local illumination and recursive ray tracing know.
+    #[inline]
+    pub fn ambient(&self) -> &[(EmitterId, Spectrum)] {
+        &self.ambient
     }
 
     /// A light point that a sensor could see, with p_k (as in [`EmissionDensity`]); `None` where the
