@@ -18,6 +18,7 @@
 //! - [`io`]: one file per format.
 //! - [`report`]: comparison of images.
 //! - [`proof`]: statements of the theory, tested on a scene.
+//! - [`bench`]: estimators side by side in equal time, as a page.
 //! - [`cli`]: the command line.
 //!
 //! ```no_run
@@ -35,6 +36,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod bench;
 pub mod cli;
 pub mod describe;
 pub mod elements;

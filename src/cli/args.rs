@@ -33,6 +33,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Say how an image differs from a reference.
     Compare(CompareArgs),
+    /// Run estimators side by side on scenes and say which finds the light how fast, as a page.
+    Bench(BenchArgs),
     /// Test on a scene that both equations measure the same, for every number of scatterings.
     Adjoint(AdjointArgs),
 }
@@ -368,4 +370,54 @@ pub struct ProofArgs {
     /// As JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// What to run side by side.
+#[derive(Clone, Debug, Args)]
+pub struct BenchArgs {
+    /// Scene files (Mitsuba 3 XML).
+    #[arg(value_name = "SCENE.xml", required = true, value_hint = ValueHint::FilePath)]
+    pub scenes: Vec<PathBuf>,
+    /// Directory for index.html, report.json and report.csv.
+    #[arg(short, long = "output", value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub output: PathBuf,
+    /// Estimators.
+    #[arg(short, long, value_delimiter = ',', value_name = "LIST", default_value = "gather,shoot,bidirectional")]
+    pub estimators: Vec<String>,
+    /// A renderer that is not ours, on the same files: mitsuba[:variant[:integrator]] (repeatable).
+    #[arg(long, value_name = "PEER")]
+    pub peer: Vec<String>,
+    /// Times at which errors are compared, such as 5s,20s; runs end at the longest [default: 5s].
+    #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = units::duration, conflicts_with = "spp")]
+    pub time: Vec<Duration>,
+    /// The same in samples per pixel.
+    #[arg(long, value_delimiter = ',', value_name = "LIST", value_parser = clap::value_parser!(u64).range(1..))]
+    pub spp: Option<Vec<u64>>,
+    /// Runs of each, interleaved; with one there are no intervals and no ratios.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub runs: u32,
+    /// Image to take errors from [default: made once and kept beside the scene].
+    #[arg(long, value_name = "REF.exr", value_hint = ValueHint::FilePath)]
+    pub reference: Option<PathBuf>,
+    /// Relative standard error wanted of a reference that has to be made.
+    #[arg(long, value_name = "E", default_value_t = 0.02, value_parser = positive)]
+    pub reference_error: f64,
+    /// Time after which a reference is taken as it is [default: that of 12 runs].
+    #[arg(long, value_name = "TIME", value_parser = units::duration)]
+    pub reference_time: Option<Duration>,
+    /// Size of the films instead of the scenes', such as 320x240.
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    pub size: Option<[u32; 2]>,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Value for `$name` in the scenes (repeatable).
+    #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = units::define)]
+    pub define: Vec<(String, String)>,
+    /// Threads [default: all that the machine has].
+    #[arg(short = 't', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+    /// Say nothing but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
 }

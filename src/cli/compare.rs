@@ -2,7 +2,6 @@
 
 use super::args::CompareArgs;
 use super::{Exit, Failure, say};
-use crate::io::exr::ImageFile;
 use crate::io::write::read_image;
 use crate::report::{Picture, compare};
 use std::path::Path;
@@ -20,12 +19,8 @@ pub fn run(args: &CompareArgs) -> Result<Exit, Failure> {
     }
 }
 
-/// An image file with its variance layer and its number of samples, where it has them.
+/// An image file with its variance layers and its number of samples, where it has them.
 pub fn picture(path: &Path) -> Result<Picture, Failure> {
     let file = read_image(path).map_err(|f| Failure::usage(f.to_string()))?;
-    let mean = file.rgb("").ok_or_else(|| Failure::usage(format!("{}: no channels R, G, B or Y", path.display())))?;
-    let ImageFile { width, height, .. } = file;
-    let samples = file.attributes.get("samples").and_then(|s| s.parse().ok());
-    let (variance, block_variance) = (file.rgb("variance"), file.rgb("blockVariance"));
-    Ok(Picture { width, height, mean, variance, block_variance, samples })
+    Picture::of_file(&file).ok_or_else(|| Failure::usage(format!("{}: no channels R, G, B or Y", path.display())))
 }

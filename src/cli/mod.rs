@@ -8,9 +8,11 @@
 //! - [`render`], [`output`], [`progress`], [`interrupt`]: rendering.
 //! - [`layers`]: what is written beside the image.
 //! - [`elements`]: rendering by finite elements.
+//! - [`bench`]: estimators side by side, as a page.
 //! - [`info`], [`compare`], [`proof`]: the other subcommands.
 
 pub mod args;
+pub mod bench;
 pub mod compare;
 pub mod elements;
 pub mod info;
@@ -83,6 +85,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Check(args) => open::check(args),
         Command::Info(args) => info::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Bench(args) => bench::run(args, &arguments),
         Command::Adjoint(args) => proof::adjoint(args),
     };
     ExitCode::from(match outcome {

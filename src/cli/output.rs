@@ -4,10 +4,10 @@ use super::args::RenderArgs;
 use super::units::show_bytes;
 use super::{Exit, Failure};
 use crate::film::Film;
-use crate::io::exr::ImageFile;
 use crate::io::fault::Fault;
 use crate::io::png::PngOptions;
 use crate::io::write::{OutputFormat, check_writable, write_image};
+use crate::report::Picture;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -41,13 +41,8 @@ impl Outputs {
 
     /// Writes all files, with layers by name beside the image; what failed, after all have been tried.
     pub fn write(&self, film: &Film, layers: &[(String, Vec<[f32; 3]>)], attributes: &BTreeMap<String, String>) -> Vec<Fault> {
-        let mut file = ImageFile::new(film.width(), film.height());
-        file.attributes.clone_from(attributes);
-        file.insert_rgb("", &film.mean());
-        if film.passes().count() >= 2 {
-            file.insert_rgb("variance", &film.variance_of_mean());
-            file.insert_rgb("blockVariance", &film.variance_of_tile_mean());
-        }
+        let mut file = Picture::of_film(film).to_file();
+        file.attributes.extend(attributes.clone());
         layers.iter().for_each(|(name, pixels)| file.insert_rgb(name, pixels));
         self.paths.iter().filter_map(|path| write_image(path, &file, self.png).err()).collect()
     }
