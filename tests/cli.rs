@@ -460,3 +460,38 @@ fn local_and_recursive_say_what_they_leave_out() {
         assert_eq!(code, 2, "{wrong:?}: {err}");
     }
 }
+
+#[test]
+fn the_longest_path_is_chosen_and_explained() {
+    let room = Room::new();
+    let (image, figures) = (room.path("a.exr"), room.path("figures.json"));
+    let long = room.changed(r#"<integer name="max_depth" value="4"/>"#, "");
+    let render = |scene: &Path, rest: &[&str]| {
+        let mut command = nephroid();
+        command.arg("render").arg(scene).arg("-o").arg(&image).arg("--stats").arg(&figures);
+        run(command.args(["--max-length", "auto"]).args(rest))
+    };
+    let read =
+        || -> serde_json::Value { serde_json::from_str(&std::fs::read_to_string(&figures).expect("figures")).expect("JSON") };
+    let (code, _, err) = render(&long, &["--truncation", "0.01"]);
+    assert_eq!(code, 0, "{err}");
+    // The floor reflects 0.7: 0.7^13 is the first power below 0.01.
+    assert!(
+        err.contains("q = 0.700; 12 scatterings") && err.contains("no pixel lacks more") && err.contains("measured"),
+        "{err}"
+    );
+    let json = read();
+    assert_eq!((&json["max_length"], &json["truncation"]["a_priori"]), (&13.into(), &true.into()), "{json}");
+    let glass = std::fs::read_to_string(&long)
+        .expect("the scene")
+        .replace("<point name=\"center\"", "<bsdf type=\"dielectric\"/><point name=\"center\"");
+    std::fs::write(room.path("glass.xml"), glass).expect("the scene is written");
+    let (code, _, err) = render(&room.path("glass.xml"), &[]);
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("no a-priori bound") && err.contains("by estimate"), "{err}");
+    assert_eq!(read()["truncation"]["a_priori"], false);
+    for wrong in [vec!["--truncation", "0"], vec!["--estimator", "local"]] {
+        let (code, _, err) = render(&long, &wrong);
+        assert_eq!(code, 2, "{err}");
+    }
+}

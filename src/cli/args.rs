@@ -258,6 +258,15 @@ pub struct ElementsArgs {
     pub residual_log: Option<PathBuf>,
 }
 
+/// Where paths are cut off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MaxLength {
+    /// After so many edges.
+    Edges(u32),
+    /// Where little is left.
+    Auto,
+}
+
 /// Which paths, by which joins.
 #[derive(Clone, Debug, Args)]
 pub struct TransportArgs {
@@ -270,9 +279,12 @@ pub struct TransportArgs {
     /// Shortest path in edges (1 = a lamp seen directly).
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub min_length: u32,
-    /// Longest path in edges [default: the scene's max_depth].
-    #[arg(long, value_name = "N")]
-    pub max_length: Option<u32>,
+    /// Longest path in edges, or `auto`: as long as --truncation asks for [default: the scene's max_depth].
+    #[arg(long, value_name = "N|auto", value_parser = units::max_length)]
+    pub max_length: Option<MaxLength>,
+    /// What may be lost by the longest path, as a share.
+    #[arg(long, value_name = "E", default_value_t = 1e-3, value_parser = positive)]
+    pub truncation: f64,
     /// Only paths of a class, such as 'E D S+ L' or 'visible-to:gather,shoot'.
     #[arg(long, value_name = "EXPR")]
     pub paths: Option<String>,

@@ -1,6 +1,6 @@
 //! `render`: a scene file to images, progressively, until the budget is used up or somebody stops it.
 
-use super::args::{EstimatorName, HeuristicName, RenderArgs, TechniqueName};
+use super::args::{EstimatorName, HeuristicName, MaxLength, RenderArgs, TechniqueName};
 use super::open::{self, Described, Opened};
 use super::output::{self, Outputs};
 use super::progress::ProgressLine;
@@ -10,7 +10,7 @@ use crate::io::exr::ImageFile;
 use crate::io::fault::{Fault, reason};
 use crate::io::png::PngOptions;
 use crate::io::write::{write_atomic, write_image};
-use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Render, left_out};
+use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Render, Truncation, left_out};
 use crate::scene::Scene;
 use crate::transport::class::PathFilter;
 use crate::transport::mis::Heuristic;
@@ -63,6 +63,7 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
         tell("warning: the ambient light has no effect: only --estimator local, local-unshadowed and recursive know it\n");
     }
     options.settings.paths = paths;
+    let truncation = truncate(&opened.scene, &mut options, args)?;
     let (shortest, longest) = (options.settings.min_length, options.settings.max_length);
     if shortest > longest {
         return Err(Failure::usage(format!("no path is at least {shortest} and at most {longest} edges long")));
@@ -73,7 +74,7 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
     let whole = output::memory_needed(width, height, args.transport.light_paths, options.settings.techniques.shoots());
     layers::check_memory(&options.layers, whole, [width, height], args.max_memory)?;
     let budget = budget(&opened.scene, args);
-    let mut job = Job { args, command, outputs, estimator, options, budget, start };
+    let mut job = Job { args, command, outputs, estimator, options, truncation, budget, start };
     if !args.quiet {
         tell(&job.announcement());
     }
@@ -131,12 +132,57 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
         HeuristicName::Power => Heuristic::Power,
     };
     s.min_length = t.min_length;
-    s.max_length = t.max_length.unwrap_or(s.max_length);
+    if let Some(MaxLength::Edges(n)) = t.max_length {
+        s.max_length = n;
+    }
     s.light_paths = t.light_paths;
     s.connections = t.connections;
     s.guided = !t.no_guide;
     s.seed = args.seed.unwrap_or(opened.scene.seed);
     (estimator, options)
+}
+
+/// Chooses the longest path where that is asked for, and says why.
+fn truncate(scene: &Scene, options: &mut Options, args: &RenderArgs) -> Result<Option<Truncation>, Failure> {
+    if args.transport.max_length != Some(MaxLength::Auto) {
+        return Ok(None);
+    }
+    if options.settings.coupling != Coupling::All {
+        return Err(Failure::usage("--max-length auto is for estimators that resolve the whole coupling"));
+    }
+    let film = &scene.film;
+    let crop = film.crop.unwrap_or([0, 0, film.width, film.height]);
+    let chosen = Truncation::choose(scene, &options.settings, crop, args.transport.truncation);
+    options.settings.max_length = chosen.max_length();
+    if !args.quiet {
+        tell(&explain(&chosen));
+    }
+    Ok(Some(chosen))
+}
+
+/// The choice in words.
+fn explain(t: &Truncation) -> String {
+    let d = t.scatterings;
+    let mut text = match (t.bound, t.flux_at_most) {
+        (Some(bound), Some(flux)) => {
+            let mut text = format!(
+                "max length auto: materials scatter at most q = {:.3}; {d} scatterings, bound q^{} = {bound:.2e}\n",
+                t.contraction,
+                d + 1
+            );
+            text += &format!("  no pixel lacks more than {bound:.2e} of the largest radiance of the scene");
+            text += if t.unbounded_radiance { " (which has no bound near points, spots and parallel light)\n" } else { "\n" };
+            text + &format!("  the scene lacks no more than {bound:.2e} of its flux, which is at most {flux:.3} W\n")
+        }
+        _ => format!(
+            "max length auto: materials scatter up to q = 1 (glass, ideal mirrors): there is no a-priori bound; {d} scatterings by estimate\n"
+        ),
+    };
+    let (tail, ratio) = (t.measured_tail, t.measured_ratio);
+    text += &format!(
+        "  measured and extrapolated: {tail:.1e} of the image is beyond, terms fall by {ratio:.2} each (an estimate, no bound)\n"
+    );
+    text
 }
 
 /// Passes and time: the command line's, else the scene's passes.
@@ -163,6 +209,7 @@ struct Job<'a> {
     outputs: Outputs,
     estimator: Estimator,
     options: Options,
+    truncation: Option<Truncation>,
     budget: Budget,
     start: Instant,
 }
@@ -312,6 +359,7 @@ impl Job<'_> {
             "paths": set.paths.text(),
             "min_length": set.min_length,
             "max_length": set.max_length,
+            "truncation": self.truncation,
             "connections": set.connections,
             "guided": set.guided,
             "seed": set.seed,

@@ -2,7 +2,16 @@
 //!
 //! Each parser says what it expects, with an example, since clap shows just that sentence.
 
+use super::args::MaxLength;
 use std::time::Duration;
+
+/// Edges of the longest path, or `auto`.
+pub fn max_length(text: &str) -> Result<MaxLength, String> {
+    if text == "auto" {
+        return Ok(MaxLength::Auto);
+    }
+    text.parse().map(MaxLength::Edges).map_err(|_| "expected a number of edges, or auto".into())
+}
 
 /// `20s`, `5m`, `1h30m`, `250ms`, or plain seconds.
 pub fn duration(text: &str) -> Result<Duration, String> {

@@ -23,6 +23,7 @@ mod measure;
 mod passes;
 mod pilot;
 mod sink;
+pub mod truncation;
 
 pub use estimator::{Estimator, Options};
 pub use known::film_of;
@@ -30,6 +31,7 @@ pub use layers::{Layers, Partition};
 pub use left_out::left_out;
 pub use measure::{Measurement, PixelMeasurement, measure};
 pub use passes::SHOOT_JOB;
+pub use truncation::Truncation;
 
 use crate::film::{Film, FilmError, Filter};
 use crate::scene::Scene;

@@ -5,3 +5,4 @@ mod lights;
 mod partial;
 mod pyramid;
 mod support;
+mod truncation;
