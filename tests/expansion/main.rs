@@ -1,5 +1,6 @@
 //! The expansion Σ τⁿLᵉ taken apart: layers, techniques and lights of one render, and what is left out of it.
 
+mod direct;
 mod layers;
 mod lights;
 mod partial;
