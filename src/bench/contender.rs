@@ -7,6 +7,7 @@ use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Rend
 use crate::report::Picture;
 use crate::scene::Scene;
 use crate::transport::RayCounts;
+use crate::transport::settings::Coupling;
 use std::time::{Duration, Instant};
 
 /// An image on the way.
@@ -90,7 +91,9 @@ impl Contender for Walker<'_> {
     }
 
     fn layers(&mut self, reference: &Reference, budget: &Budget, stop: Stop<'_>) -> Option<Layers> {
-        layers(self.scene, &self.options, reference, budget, stop)
+        // Recursion has no joins to tell apart.
+        let walks = self.options.settings.coupling == Coupling::All;
+        walks.then(|| layers(self.scene, &self.options, reference, budget, stop)).flatten()
     }
 
     fn run(&mut self, seed: u64, checkpoints: &[Mark], stop: Stop<'_>) -> Result<Option<Run>, String> {

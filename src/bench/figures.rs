@@ -5,6 +5,7 @@
 //! noise of the reference is expected to add is taken off first, and an error that is mostly that (less
 //! than twice of it) is said to be below the noise of the reference.
 
+use super::cost::Cost;
 use super::effort::{Effort, Mark};
 use super::layers::Layers;
 use super::race::Entry;
@@ -56,6 +57,8 @@ pub struct SceneReport {
     pub contenders: Vec<ContenderFigures>,
     /// Every pair, at every mark.
     pub ratios: Vec<Ratio>,
+    /// What coupling costs here.
+    pub cost: Vec<Cost>,
     /// What estimators cannot make here.
     pub blind: Vec<Blind>,
     /// In words.
@@ -335,6 +338,7 @@ impl SceneReport {
             }),
             ratios: ratios(&contenders, &marks),
             contenders,
+            cost: Vec::new(),
             blind: coverage.blind,
             verdict: Vec::new(),
         };

@@ -11,10 +11,12 @@
 //! - [`statistics`]: means, ratios and slopes with intervals.
 //! - [`figures`]: what the runs say.
 //! - [`layers`]: who carries which light and which noise.
+//! - [`cost`]: what following more of the coupling costs.
 //! - [`verdict`]: all that in words.
 //! - [`table`]: as CSV; [`page`]: as one HTML file.
 
 pub mod contender;
+pub mod cost;
 pub mod effort;
 pub mod figures;
 pub mod layers;

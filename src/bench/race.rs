@@ -95,7 +95,7 @@ impl Entry {
 }
 
 /// What a run says.
-fn figures(seed: u64, run: &Run, reference: &Reference) -> RunFigures {
+pub fn figures(seed: u64, run: &Run, reference: &Reference) -> RunFigures {
     let curve: Vec<Point> = run.snapshots.iter().map(|s| point(s.seconds, s.samples, &s.image, reference)).collect();
     let errors: Vec<_> = curve.iter().map(|p| (p.samples as f64, p.own(p.relmse_trimmed, p.noise.relmse_trimmed))).collect();
     let errors: Vec<_> = errors.into_iter().filter_map(|(n, e)| e.map(|e| (n, e))).collect();

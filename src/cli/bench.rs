@@ -4,6 +4,7 @@ use super::args::{BenchArgs, SceneArgs};
 use super::open::{self, Opened};
 use super::{Exit, Failure, interrupt, output, render, tell};
 use crate::bench::contender::{Absent, Contender, Walker};
+use crate::bench::cost::cost;
 use crate::bench::page::{self, PageImage};
 use crate::bench::peers::{Job, Peer};
 use crate::bench::race::race;
@@ -156,7 +157,8 @@ impl Bench<'_> {
         let results = entries.iter().filter(|e| !e.image.is_empty()).map(|e| image(&e.figures.name, &e.image));
         let all: Vec<PageImage> = std::iter::once(image("reference", &reference.picture.mean)).chain(results).collect();
         self.images.extend(all);
-        Ok(SceneReport::new(&subject, &reference, &self.effort, &entries))
+        let cost = cost(&opened.scene, &reference, &self.effort, &stop);
+        Ok(SceneReport { cost, ..SceneReport::new(&subject, &reference, &self.effort, &entries) })
     }
 
     fn open(&self, path: &Path) -> Result<Opened, Failure> {

@@ -3,6 +3,8 @@
 mod browser;
 mod figures;
 mod layers;
+#[cfg(unix)]
+mod peers;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -106,6 +108,9 @@ fn a_bench_leaves_figures_a_page_and_a_reference() {
         let bounds = &r["ratio"]["bounds"];
         assert!(r["ratio"].is_null() != bounds.is_array(), "a ratio has bounds: {r}");
     }
+    // The more of the coupling is followed, the less is missing.
+    let missing: Vec<f64> = (0..3).map(|k| scene["cost"][k]["missing"]["value"].as_f64().unwrap()).collect();
+    assert!(missing[0] > missing[1] && missing[1] > missing[2] + 0.005, "{missing:?}");
     assert_eq!(std::fs::read_to_string(room.path("out/report.csv")).unwrap().lines().count(), 1 + 3 * 3 * 5);
     assert!(page(&room).contains("class=\"pixels\""));
     // The reference is used again, and stays what it is.

@@ -30,7 +30,7 @@ function scenePanel(scene, index) {
   section.append(...scene.contenders.filter(c => c.remark).map(c => h("p", { class: "note" }, `${c.name}: ${c.remark}`)));
   section.append(h("details", {}, h("summary", {}, "Time, rays and memory"), workTable(scene)));
   section.append(h("h3", {}, "Error over time"), plotPanel(scene));
-  section.append(...[classPanel(scene), pyramidPanel(scene)].filter(p => p));
+  section.append(...[classPanel(scene), pyramidPanel(scene), costPanel(scene)].filter(p => p));
   const images = h("div", { class: "images" }, h("p", { class: "note" }, "Decoding images …"));
   section.append(h("h3", {}, "Images"), images);
   imagesOf(index).then(all => {

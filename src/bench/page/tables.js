@@ -125,3 +125,11 @@ function classPanel(scene) {
   return h("div", {}, h("h3", {}, "Classes of paths"), table(head, rows, above),
     h("p", { class: "note" }, "Light is relative to that of the reference, noise to that of the estimator; efficiency is 1 / (variance · time) for this class. E is the eye, L the light, D a matt or glossy event, S a mirror or smooth glass."));
 }
+
+/** No coupling, some, all. */
+function costPanel(scene) {
+  if (!scene.cost.length) return null;
+  const rows = scene.cost.map(c => [h("span", {}, c.coupling, " ", h("small", {}, c.estimator)), withInterval(c.seconds, 1000), digits(c.samples),
+    withInterval(c.relmse), withInterval(c.missing, 100, " %")]);
+  return h("div", {}, h("h3", {}, "What coupling costs"), table(["coupling", "ms per sample of all pixels", "samples", "relMSE then", "light missing"], rows));
+}

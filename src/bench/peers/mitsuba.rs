@@ -50,7 +50,7 @@ pub fn start(options: &[String], job: &Job<'_, '_>) -> Result<Process, String> {
     let mut command = Command::new("python3");
     command.arg("-c").arg(SCRIPT);
     let like = INTEGRATORS.iter().find(|i| i.0 == integrator.as_str()).map(|i| i.1);
-    let mut process = Process::start(&mut command, format!("mitsuba:{variant}:{integrator}"), &setup)?;
+    let mut process = Process::start(&mut command, format!("mitsuba:{variant}:{integrator}"), size(scene), &setup)?;
     process.like = like;
     let version = process.ready["version"].as_str().unwrap_or("of unknown version").to_owned();
     process.remark = format!("Mitsuba {version}, loading and compiling not counted.");

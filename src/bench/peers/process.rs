@@ -26,6 +26,7 @@ pub struct Process {
     input: ChildStdin,
     lines: Receiver<String>,
     directory: tempfile::TempDir,
+    pixels: usize,
     /// What it said when it was ready.
     pub ready: Value,
     /// What has to be known of its figures.
@@ -35,8 +36,8 @@ pub struct Process {
 }
 
 impl Process {
-    /// Starts the program and hands it its setup.
-    pub fn start(command: &mut Command, name: String, setup: &Value) -> Result<Self, String> {
+    /// Starts the program, which makes images of this size, and hands it its setup.
+    pub fn start(command: &mut Command, name: String, [width, height]: [u32; 2], setup: &Value) -> Result<Self, String> {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         // An interrupt at the terminal is for us; the peer is ended in order.
         #[cfg(unix)]
@@ -56,7 +57,17 @@ impl Process {
             }
         });
         let directory = tempfile::tempdir().map_err(|e| e.to_string())?;
-        let mut process = Self { name, child, input, lines, directory, ready: Value::Null, remark: String::new(), like: None };
+        let mut process = Self {
+            name,
+            child,
+            input,
+            lines,
+            directory,
+            pixels: width as usize * height as usize,
+            ready: Value::Null,
+            remark: String::new(),
+            like: None,
+        };
         process.send(setup)?;
         process.ready = process.answer(&|| false)?.unwrap_or_default();
         Ok(process)
@@ -102,7 +113,10 @@ impl Process {
 
     /// The image that was just written.
     fn image(&self) -> Result<Vec<[f32; 3]>, String> {
-        let bytes = std::fs::read(self.file()).map_err(|e| e.to_string())?;
+        let bytes = std::fs::read(self.file()).map_err(|e| format!("the image cannot be read: {e}"))?;
+        if bytes.len() != 12 * self.pixels {
+            return Err(format!("the image has {} bytes instead of {}", bytes.len(), 12 * self.pixels));
+        }
         let number = |b: &[u8]| b.try_into().map_or(f32::NAN, f32::from_le_bytes);
         Ok(bytes.chunks_exact(12).map(|p| [number(&p[..4]), number(&p[4..8]), number(&p[8..])]).collect())
     }
