@@ -233,7 +233,7 @@ fn renders_every_format_with_figures() {
     command.arg("-o").arg(room.path("a.exr")).arg("-o").arg(room.path("a.png")).arg("--stats").arg(room.path("s.json"));
     let (code, out, err) = run(&mut command);
     assert_eq!((code, out.as_str()), (0, ""), "{err}");
-    assert!(err.contains("estimator bidirectional") && err.contains("4 samples per pixel"), "{err}");
+    assert!(err.contains("estimator auto") && err.contains("chosen in") && err.contains("4 samples per pixel"), "{err}");
     assert_eq!(room.files(), ["a.exr", "a.png", "s.json", "scene.xml"]);
     let image = read_image(&room.path("a.exr")).expect("an image");
     assert_eq!((image.width, image.height), (20, 18));
@@ -242,7 +242,7 @@ fn renders_every_format_with_figures() {
     assert!(image.rgb("variance").is_some() && image.rgb("blockVariance").is_some());
     let attribute = |name: &str| image.attributes.get(name).map(String::as_str);
     assert_eq!(attribute("samples"), Some("4"));
-    assert_eq!((attribute("estimator"), attribute("seed")), (Some("bidirectional"), Some("3")));
+    assert_eq!((attribute("estimator"), attribute("seed")), (Some("auto"), Some("3")));
     assert!(attribute("command").is_some_and(|c| c.contains("-D size=20")));
     let figures = std::fs::read_to_string(room.path("s.json")).expect("figures");
     let figures: serde_json::Value = serde_json::from_str(&figures).expect("JSON");
@@ -261,7 +261,7 @@ fn threads_leave_no_trace() {
         assert_eq!((code, err.as_str()), (0, ""));
         read_image(&path).expect("an image").channels
     };
-    for estimator in ["gather", "shoot", "bidirectional"] {
+    for estimator in ["gather", "shoot", "bidirectional", "auto"] {
         let one = image("1.exr", &["-e", estimator, "-t", "1"]);
         for threads in ["2", "3", "7"] {
             assert_eq!(one, image("n.exr", &["-e", estimator, "-t", threads]), "{estimator} with {threads} threads");

@@ -67,8 +67,10 @@ pub enum EstimatorName {
     /// From the lights: the potential equation (light tracing).
     Shoot,
     /// Both, joined wherever they meet and weighted.
-    #[default]
     Bidirectional,
+    /// What a pilot finds best for the scene, merges included (consistent).
+    #[default]
+    Auto,
     /// What the scene's integrator element asks for.
     Scene,
     /// Lights alone, no coupling between surfaces.
@@ -129,6 +131,8 @@ pub enum TechniqueName {
     Splat,
     /// A gathering vertex is joined to a shooting vertex.
     Connect,
+    /// Vertices of both walkers near each other count as one, between mirrors or smooth glass; consistent.
+    Merge,
 }
 
 /// Heuristics of multiple importance sampling by name.
@@ -148,6 +152,16 @@ impl Default for HeuristicName {
             Heuristic::Power => Self::Power,
         }
     }
+}
+
+/// Samplers by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum SamplerName {
+    /// First decisions from Owen-scrambled Sobol sequences.
+    #[default]
+    Stratified,
+    /// All decisions independent.
+    Independent,
 }
 
 /// How to render.
@@ -297,6 +311,10 @@ pub struct TransportArgs {
     /// Let light start as the lamps emit it, not where a pilot found that it matters
     #[arg(long)]
     pub no_guide: bool,
+    /// How walks draw: evenly spread over their first decisions (the variance that the image reports is
+    /// then an upper bound), or independently of each other
+    #[arg(long, value_enum, default_value_t, value_name = "NAME")]
+    pub sampler: SamplerName,
 }
 
 /// What to say about a scene.

@@ -1,6 +1,6 @@
 //! `render`: a scene file to images, progressively, until the budget is used up or somebody stops it.
 
-use super::args::{EstimatorName, HeuristicName, MaxLength, RenderArgs, TechniqueName};
+use super::args::{EstimatorName, HeuristicName, MaxLength, RenderArgs, SamplerName, TechniqueName};
 use super::open::{self, Described, Opened};
 use super::output::{self, Outputs};
 use super::progress::ProgressLine;
@@ -14,7 +14,7 @@ use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Rend
 use crate::scene::Scene;
 use crate::transport::class::PathFilter;
 use crate::transport::mis::Heuristic;
-use crate::transport::settings::{Coupling, Techniques};
+use crate::transport::settings::{Coupling, Plan, Techniques};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::Write;
@@ -114,6 +114,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
         EstimatorName::LocalUnshadowed => Estimator::LocalUnshadowed,
         EstimatorName::Recursive => Estimator::Recursive,
         EstimatorName::Bidirectional => Estimator::Bidirectional,
+        EstimatorName::Auto => Estimator::Auto,
         EstimatorName::Scene => Estimator::of_integrator(&opened.description.integrator.name),
     };
     let mut options = Options::for_scene(&opened.scene, estimator);
@@ -125,6 +126,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
             next_event: has(TechniqueName::Nee),
             splat: has(TechniqueName::Splat),
             connect: has(TechniqueName::Connect),
+            merge: has(TechniqueName::Merge),
         };
     }
     s.heuristic = match t.heuristic {
@@ -138,6 +140,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     s.light_paths = t.light_paths;
     s.connections = t.connections;
     s.guided = !t.no_guide;
+    s.stratified = t.sampler == SamplerName::Stratified;
     s.seed = args.seed.unwrap_or(opened.scene.seed);
     (estimator, options)
 }
@@ -221,21 +224,25 @@ impl Job<'_> {
         let time = self.budget.time.map(|t| format!("{} at most", show_duration(t)));
         let until: Vec<String> = passes.into_iter().chain(time).collect();
         let name = self.estimator.name();
-        format!("estimator {name} ({}), {}, seed {}\n", self.techniques(), until.join(", "), self.options.settings.seed)
+        let joins = self.options.settings.techniques.names();
+        format!("estimator {name} ({joins}), {}, seed {}\n", until.join(", "), self.options.settings.seed)
     }
 
-    fn techniques(&self) -> String {
-        let t = self.options.settings.techniques;
-        let names = [(t.hit, "hit"), (t.next_event, "nee"), (t.splat, "splat"), (t.connect, "connect")];
-        names.iter().filter(|n| n.0).map(|n| n.1).collect::<Vec<_>>().join(", ")
+    /// What a pilot chose.
+    fn choice(&self, plan: &Plan, pilot: Duration) -> String {
+        let joins = plan.settings.techniques.names();
+        format!("chosen in {}: {joins}; {} light paths per pass\n", show_duration(pilot), show_count(f64::from(plan.light_paths)))
     }
 
     fn run(&mut self, scene: &Scene) -> Result<Exit, Failure> {
+        let began = Instant::now();
         let mut render = Render::new(scene, &self.options).map_err(|e| Failure::usage(e.to_string()))?;
+        if self.options.settings.automatic && !self.args.quiet {
+            tell(&self.choice(render.plan(), began.elapsed()));
+        }
         let pixels = u64::from(render.film().width()) * u64::from(render.film().height());
         let line = ProgressLine::new(self.args.quiet, self.budget.passes, self.budget.time, pixels);
         interrupt::install(self.args.quiet);
-        let began = Instant::now();
         let mut save_after = SAVE_EVERY;
         let mut warned = false;
         loop {
@@ -329,7 +336,7 @@ impl Job<'_> {
             ("software", format!("nephroid {}", env!("CARGO_PKG_VERSION"))),
             ("sceneHash", scene.hash_hex()),
             ("estimator", self.estimator.name().to_owned()),
-            ("techniques", self.techniques()),
+            ("techniques", render.plan().settings.techniques.names()),
             ("seed", set.seed.to_string()),
             ("samples", s.passes.to_string()),
             ("renderTime", format!("{:.3}", s.time.as_secs_f64())),
@@ -345,7 +352,7 @@ impl Job<'_> {
     fn figures(&self, render: &Render, scene: &Scene) -> serde_json::Value {
         let s = render.statistics();
         let film = render.film();
-        let set = &self.options.settings;
+        let set = &render.plan().settings;
         let seconds = s.time.as_secs_f64();
         let samples = s.passes as f64 * f64::from(film.width()) * f64::from(film.height());
         serde_json::json!({
@@ -354,14 +361,16 @@ impl Job<'_> {
             "scene": self.args.scene.scene.to_string_lossy(),
             "scene_hash": scene.hash_hex(),
             "estimator": self.estimator.name(),
-            "techniques": self.techniques(),
+            "techniques": render.plan().settings.techniques.names(),
             "heuristic": if set.heuristic == Heuristic::Power { "power" } else { "balance" },
             "paths": set.paths.text(),
             "min_length": set.min_length,
             "max_length": set.max_length,
             "truncation": self.truncation,
             "connections": set.connections,
+            "merge_radius": render.plan().merge_radius,
             "guided": set.guided,
+            "stratified": set.stratified,
             "seed": set.seed,
             "width": film.width(),
             "height": film.height(),

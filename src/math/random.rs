@@ -3,6 +3,11 @@
 //! A walk owns one small generator whose state is hashed from what identifies the sample, so that
 //! an image does not depend on threads, tiles or the order of work. Dimensions are consumed in the
 //! order in which the walk asks for them.
+//!
+//! The first dimensions of a walk can be those of a point of an Owen-scrambled Sobol sequence
+//! [Burley 2020]: many walks together then fill the space of their first decisions evenly, each of
+//! them still being uniformly distributed. Code that decides something in the same order in all walks
+//! asks for an axis; code that may or may not run, for a free number.
 
 use glam::Vec2;
 use rand::Rng;
@@ -10,7 +15,24 @@ use rand_pcg::Pcg32;
 
 /// The stream of numbers of one walk.
 #[derive(Clone, Debug)]
-pub struct Random(Pcg32);
+pub struct Random {
+    free: Pcg32,
+    point: Point,
+}
+
+/// How far the axes of a point of a sequence are used up.
+#[derive(Clone, Debug, Default)]
+struct Point {
+    index: u32,
+    seed: u32,
+    /// Dimensions given out, and how many there are (a multiple of four).
+    next: u32,
+    end: u32,
+    four: [f32; 4],
+}
+
+/// Points of a sequence that are used together: more come from another sequence.
+const SEQUENCE: u64 = 1 << 16;
 
 /// Which family of samples a stream belongs to; families never share numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,13 +64,44 @@ impl Random {
     pub fn new(family: Family, index: u64, sample: u64, seed: u64) -> Self {
         let a = mix(seed ^ mix(((family as u64) << 56) ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
         let b = mix(a ^ sample.wrapping_mul(0xd1b5_4a32_d192_ed03));
-        Self(Pcg32::new(b, a))
+        Self { free: Pcg32::new(b, a), point: Point::default() }
+    }
+
+    /// The same stream, its first `axes` axes (a multiple of four) those of point `point` of the sequence
+    /// that belongs to `index` of `family`.
+    #[inline]
+    pub fn with_point(mut self, family: Family, index: u64, point: u64, seed: u64, axes: u32) -> Self {
+        let sequence = index ^ (point / SEQUENCE).rotate_right(16);
+        let seed = mix(seed ^ mix(!((family as u64) << 56) ^ sequence.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
+        self.point = Point { index: (point % SEQUENCE) as u32, seed: seed as u32, next: 0, end: axes, four: [0.0; 4] };
+        self
+    }
+
+    /// Uniform in [0, 1): the next axis of the walk's point, a free number after the last.
+    #[inline]
+    pub fn axis(&mut self) -> f32 {
+        let p = &mut self.point;
+        if p.next == p.end {
+            return self.unit();
+        }
+        if p.next.is_multiple_of(4) {
+            p.four = sobol_burley::sample_4d(p.index, p.next / 4, p.seed);
+        }
+        p.next += 1;
+        p.four[(p.next as usize - 1) % 4]
+    }
+
+    /// Uniform in [0, 1)², two axes.
+    #[inline]
+    pub fn axis2(&mut self) -> Vec2 {
+        let x = self.axis();
+        Vec2::new(x, self.axis())
     }
 
     /// Uniform in [0, 1), a multiple of 2⁻²⁴.
     #[inline]
     pub fn unit(&mut self) -> f32 {
-        (self.0.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
+        (self.free.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
     }
 
     /// Uniform in [0, 1)².
@@ -60,6 +113,6 @@ impl Random {
     /// Uniform integer below `n` (`n` > 0), by multiplication; bias below n/2³².
     #[inline]
     pub fn below(&mut self, n: u32) -> u32 {
-        ((u64::from(self.0.next_u32()) * u64::from(n)) >> 32) as u32
+        ((u64::from(self.free.next_u32()) * u64::from(n)) >> 32) as u32
     }
 }

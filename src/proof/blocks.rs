@@ -159,7 +159,7 @@ impl<'a> Series<'a> {
 
     fn pass(&self, pass: u64, blocks: &mut Blocks<'_>) {
         let (plan, seed) = (&self.plan, self.plan.settings.seed);
-        let cx = Context { scene: self.scene, plan };
+        let cx = Context::new(self.scene, plan, pass);
         let found = Cell::new(None);
         let mut rays = RayCounts::default();
         let mut at = At { filter: &self.filter, pixel: (0, 0), found: &found };

@@ -16,8 +16,10 @@ pub enum Estimator {
     /// `⟨Lᵉ, W⟩`: light tracing [Arvo 1986].
     Shoot,
     /// Both, weighted: bidirectional path tracing [Veach 1997].
-    #[default]
     Bidirectional,
+    /// Whatever joins and numbers of walks a pilot finds best for the scene, merges included.
+    #[default]
+    Auto,
     /// No coupling: lights alone, seen where nothing is between.
     Local,
     /// No coupling, no visibility.
@@ -28,7 +30,7 @@ pub enum Estimator {
 
 impl Estimator {
     /// Names on the command line.
-    pub const NAMES: [&str; 6] = ["gather", "shoot", "bidirectional", "local", "local-unshadowed", "recursive"];
+    pub const NAMES: [&str; 7] = ["gather", "shoot", "bidirectional", "auto", "local", "local-unshadowed", "recursive"];
 
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -36,6 +38,7 @@ impl Estimator {
             Self::Gather => "gather",
             Self::Shoot => "shoot",
             Self::Bidirectional => "bidirectional",
+            Self::Auto => "auto",
             Self::Local => "local",
             Self::LocalUnshadowed => "local-unshadowed",
             Self::Recursive => "recursive",
@@ -44,7 +47,8 @@ impl Estimator {
 
     /// By name.
     pub fn parse(name: &str) -> Option<Self> {
-        let all = [Self::Gather, Self::Shoot, Self::Bidirectional, Self::Local, Self::LocalUnshadowed, Self::Recursive];
+        let all =
+            [Self::Gather, Self::Shoot, Self::Bidirectional, Self::Auto, Self::Local, Self::LocalUnshadowed, Self::Recursive];
         all.into_iter().find(|e| e.name() == name)
     }
 
@@ -60,7 +64,7 @@ impl Estimator {
     /// What it follows between surfaces.
     pub fn coupling(self) -> Coupling {
         match self {
-            Self::Gather | Self::Shoot | Self::Bidirectional => Coupling::All,
+            Self::Gather | Self::Shoot | Self::Bidirectional | Self::Auto => Coupling::All,
             Self::Recursive => Coupling::Specular,
             Self::Local => Coupling::None { shadows: true },
             Self::LocalUnshadowed => Coupling::None { shadows: false },
@@ -76,12 +80,13 @@ impl Estimator {
         }
     }
 
-    /// Its joins.
+    /// The joins it may use.
     pub fn techniques(self) -> Techniques {
         match self {
             Self::Gather | Self::Local | Self::LocalUnshadowed | Self::Recursive => Techniques::GATHER,
             Self::Shoot => Techniques::SHOOT,
             Self::Bidirectional => Techniques::BIDIRECTIONAL,
+            Self::Auto => Techniques::ALL,
         }
     }
 }
@@ -107,6 +112,7 @@ impl Options {
             techniques: estimator.techniques(),
             coupling: estimator.coupling(),
             max_length: i.max_depth.unwrap_or(u32::MAX).min(estimator.longest()),
+            automatic: estimator == Estimator::Auto,
             rr_depth: i.rr_depth,
             hide_emitters: i.hide_emitters,
             ..Settings::default()
@@ -120,12 +126,14 @@ impl Options {
         let t = s.techniques;
         let mut h = blake3::Hasher::new();
         h.update(&scene.hash());
-        h.update(&[u8::from(t.hit), u8::from(t.next_event), u8::from(t.splat), u8::from(t.connect)]);
-        h.update(&[u8::from(s.heuristic == Heuristic::Power), u8::from(s.hide_emitters), u8::from(s.guided)]);
+        h.update(&[t.hit, t.next_event, t.splat, t.connect, t.merge].map(u8::from));
+        let switches = [s.heuristic == Heuristic::Power, s.hide_emitters, s.guided, s.automatic, s.stratified];
+        h.update(&switches.map(u8::from));
         h.update(format!("{:?}", s.coupling).as_bytes());
         for n in [s.min_length, s.max_length, s.rr_depth, s.connections] {
             h.update(&n.to_le_bytes());
         }
+        h.update(&s.merge_radius.map_or(u32::MAX, f32::to_bits).to_le_bytes());
         h.update(&s.light_paths.map_or(u64::MAX, u64::from).to_le_bytes());
         h.update(&s.seed.to_le_bytes());
         h.update(s.paths.text().as_bytes());

@@ -69,7 +69,7 @@ impl Partition {
 pub struct Join {
     /// In edges.
     pub length: u32,
-    /// Vertices made by shooting (s); absent where the entry holds all paths of this length and above.
+    /// Vertices made by shooting (s, a merged one included); absent where the entry holds all paths of this length and above.
     pub light_vertices: Option<u32>,
     /// The join.
     pub technique: Technique,
@@ -79,6 +79,7 @@ impl Join {
     /// Such as `k3.s1t3`, or `k9+.splat`.
     pub fn name(&self) -> String {
         match self.light_vertices {
+            Some(s) if self.technique == Technique::Merge => format!("k{}.s{s}t{}.merge", self.length, self.length + 2 - s),
             Some(s) => format!("k{}.s{s}t{}", self.length, self.length + 1 - s),
             None => format!("k{}+.{:?}", self.length, self.technique).to_lowercase(),
         }
@@ -95,7 +96,7 @@ pub struct Joins {
 }
 
 /// Number of techniques.
-const TECHNIQUES: usize = 4;
+const TECHNIQUES: usize = 5;
 
 impl Joins {
     /// Longest row that can be asked for.
@@ -118,9 +119,13 @@ impl Joins {
                 };
                 out.push(t, Join { length, light_vertices: Some(s), technique });
             }
+            // A merged vertex has a Dirac event on both sides, so s and t are 3 at least.
+            for s in 3..length {
+                out.push(t, Join { length, light_vertices: Some(s), technique: Technique::Merge });
+            }
         }
         if max_length > longest {
-            for technique in [Technique::Hit, Technique::NextEvent, Technique::Connect, Technique::Splat] {
+            for technique in [Technique::Hit, Technique::NextEvent, Technique::Connect, Technique::Splat, Technique::Merge] {
                 out.push(t, Join { length: longest + 1, light_vertices: None, technique });
             }
         }
@@ -138,6 +143,7 @@ impl Joins {
             Technique::NextEvent => t.next_event,
             Technique::Connect => t.connect,
             Technique::Splat => t.splat,
+            Technique::Merge => t.merge,
         };
         if allowed {
             let at = self.index(join.technique, join.length, join.light_vertices.unwrap_or(0));

@@ -101,7 +101,7 @@ pub enum RenderError {
     #[error("the reconstruction filter has no positive integral")]
     Filter,
     /// No join is allowed.
-    #[error("no technique is left: choose at least one of hit, nee, splat, connect")]
+    #[error("no technique is left: choose at least one of hit, nee, splat, connect, merge")]
     NoTechnique,
     /// A thread pool could not be made.
     #[error("threads cannot be started: {0}")]
@@ -173,13 +173,10 @@ impl<'a> Render<'a> {
             ),
             None => None,
         };
-        let pixels = crop[2].saturating_mul(crop[3]);
         let decide = || pilot::decide(scene, &options.settings, crop);
         let decisions = pool.as_ref().map_or_else(decide, |p| p.install(decide));
-        let vertices = decisions.vertices_per_path;
-        let film_pixels = d.width.saturating_mul(d.height);
-        let plan = Plan { guide: decisions.guide, ..Plan::new(&options.settings, pixels, film_pixels, vertices) };
-        film.identity.decisions = vertices.to_bits().to_le_bytes().to_vec();
+        let plan = decisions.plan(scene, crop);
+        film.identity.decisions = decisions.bytes();
         film.identity.hash = options.identity(scene);
         let layers = options.layers.iter().map(|p| Layers::new(p, &film)).collect::<Result<_, _>>()?;
         Ok(Self { scene, plan, film, layers, filter, crop, pool, statistics: Statistics::default() })

@@ -19,6 +19,10 @@ use std::time::Instant;
 
 /// Light paths of one job.
 pub const SHOOT_JOB: u32 = 4096;
+/// Emission and the first scattering of a light path; all light paths of a pass share a sequence.
+const SHOOT_AXES: u32 = 8;
+/// Film, lens and the first vertices of a gathering walk; all passes of a pixel share a sequence.
+const GATHER_AXES: u32 = 16;
 
 /// Writes what gathering walks find into the pixel being sampled.
 struct PixelRecord<'a, S> {
@@ -86,7 +90,7 @@ fn run_into<S: Sink>(render: &mut Render<'_>, range: Range<u64>) {
 /// Shoots all light paths of a pass.
 fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat<S::Kept>>>) {
     let plan = &render.plan;
-    let cx = Context { scene: render.scene, plan };
+    let (cx, seed) = (Context::new(render.scene, plan, pass), plan.settings.seed);
     let jobs = plan.light_paths.div_ceil(SHOOT_JOB);
     let shots: Vec<Shot<S::Kept>> = (0..jobs)
         .into_par_iter()
@@ -102,8 +106,11 @@ fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<V
             let mut rays = RayCounts::default();
             let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
             for index in paths {
-                let mut random = Random::new(Family::Shoot, u64::from(index), pass, plan.settings.seed);
-                let cache = if plan.c > 0.0 { Some(&mut vertices) } else { None };
+                let mut random = Random::new(Family::Shoot, u64::from(index), pass, seed);
+                if plan.settings.stratified {
+                    random = random.with_point(Family::Shoot, pass, u64::from(index), seed, SHOOT_AXES);
+                }
+                let cache = plan.keeps_vertices().then_some(&mut vertices);
                 shoot(cx, cache, &mut random, &mut tally);
             }
             Shot { splats: record.splats, vertices, rays }
@@ -116,13 +123,13 @@ fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<V
         pieces.push(shot.vertices);
         splats.push(shot.splats);
     }
-    (LightCache::new(pieces), splats)
+    (LightCache::new(pieces, plan.merge_radius(pass)), splats)
 }
 
 /// Gathers one sample per pixel and pass, adds the splats, and commits the passes to the film.
 fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache, bins: Option<&SplatBins<S::Kept>>) {
     let (scene, plan, filter, crop) = (render.scene, &render.plan, &render.filter, render.crop);
-    let cx = Context { scene, plan };
+    let seed = plan.settings.seed;
     let exponent = render.film.exponent();
     let gathers = plan.settings.techniques.gathers();
     let film_width = u64::from(scene.film.width);
@@ -137,6 +144,7 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
             let rect = layout.tile_rect(index);
             let mut rays = RayCounts::default();
             for pass in passes.clone() {
+                let cx = Context::new(scene, plan, pass);
                 if let Some(bins) = bins {
                     for s in bins.tile(index) {
                         sink.add(Layout::local_of(s.pixel), &s.value);
@@ -146,8 +154,11 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
                     for (x, y, local) in rect.pixels() {
                         let (px, py) = (crop[0] + x, crop[1] + y);
                         let id = u64::from(py) * film_width + u64::from(px);
-                        let mut random = Random::new(Family::Gather, id, pass, plan.settings.seed);
-                        let (offset, weight) = filter.sample_offset(random.unit2());
+                        let mut random = Random::new(Family::Gather, id, pass, seed);
+                        if plan.settings.stratified {
+                            random = random.with_point(Family::Gather, id, pass, seed, GATHER_AXES);
+                        }
+                        let (offset, weight) = filter.sample_offset(random.axis2());
                         let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
                         let mut record = PixelRecord { sink: &mut sink, local };
                         let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };

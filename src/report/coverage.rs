@@ -3,7 +3,7 @@
 //! With Dirac events S (mirrors, smooth glass) and other events D, and a light L that is a Dirac one
 //! (point, spot, parallel) or not, a path `E … L` is made by a *hit* if the light is not Dirac, by a
 //! *next event* if its last event is D, by a *splat* if its first event is D, by a *connection* if
-//! two neighbouring events are both D [Veach 1997, §8.3]. What none of an estimator's joins makes is
+//! two neighbouring events are both D [Veach 1997, §8.3], by a *merge* if a D stands between two S. What none of an estimator's joins makes is
 //! missing from its image: no number of samples brings it back.
 //!
 //! A class ends in S, then L: a hit finds such a light only if a direction chosen at the last D happens
@@ -68,6 +68,8 @@ pub struct Joins {
     pub connect: Can,
     /// The lens sees a shooting vertex.
     pub splat: Can,
+    /// Vertices of both walks are merged.
+    pub merge: Can,
 }
 
 impl Joins {
@@ -81,9 +83,14 @@ impl Joins {
         self.splat
     }
 
-    /// By any.
+    /// By any but merges.
     pub fn bidirectional(self) -> Can {
         self.gather().max(self.connect).max(self.splat)
+    }
+
+    /// By any.
+    pub fn auto(self) -> Can {
+        self.bidirectional().max(self.merge)
     }
 }
 
@@ -115,6 +122,7 @@ pub fn joins(events: &[Symbol], ends: Ends) -> Joins {
         next_event: last.into(),
         connect: events.windows(2).any(|w| w == [Symbol::D, Symbol::D]).into(),
         splat: (first || direct).into(),
+        merge: events.windows(3).any(|w| w == [Symbol::S, Symbol::D, Symbol::S]).into(),
     }
 }
 
@@ -147,8 +155,10 @@ pub struct Row {
     pub gather: Can,
     /// Best of its joins.
     pub shoot: Can,
-    /// Best of all joins.
+    /// Best of all unbiased joins.
     pub bidirectional: Can,
+    /// Best of all joins.
+    pub auto: Can,
 }
 
 /// What can be made in a scene, and what not.
@@ -205,8 +215,9 @@ impl Coverage {
                 // Of lights that differ, the one that is seen worst.
                 let worst = some.map(|l| joins(&events, ends(l))).min_by_key(|j| j.splat);
                 if let Some(joins) = worst {
-                    let (gather, shoot, bidirectional) = (joins.gather(), joins.shoot(), joins.bidirectional());
-                    rows.push(Row { paths, what, dirac_light, joins, gather, shoot, bidirectional });
+                    let (gather, shoot) = (joins.gather(), joins.shoot());
+                    let (bidirectional, auto) = (joins.bidirectional(), joins.auto());
+                    rows.push(Row { paths, what, dirac_light, joins, gather, shoot, bidirectional, auto });
                 }
             }
         }
@@ -216,11 +227,11 @@ impl Coverage {
     /// For people.
     pub fn to_text(&self) -> String {
         let mut out = String::new();
-        let head = ["hit", "nee", "connect", "splat", "gather", "shoot", "both"];
+        let head = ["hit", "nee", "connect", "splat", "merge", "gather", "shoot", "both", "auto"];
         let _ = writeln!(out, "coverage      light     {}", head.map(|h| format!("{h:8}")).concat().trim_end());
         for r in &self.rows {
             let j = r.joins;
-            let cells = [j.hit, j.next_event, j.connect, j.splat, r.gather, r.shoot, r.bidirectional];
+            let cells = [j.hit, j.next_event, j.connect, j.splat, j.merge, r.gather, r.shoot, r.bidirectional, r.auto];
             let cells = cells.map(|c| format!("{:8}", c.text())).concat();
             let light = if r.dirac_light { "Dirac" } else { "hittable" };
             let _ = writeln!(out, "  {:12}{light:10}{cells} {}", r.paths, r.what);
@@ -259,6 +270,8 @@ fn blind_spots(lobes: Lobes, lights: &[(bool, bool)], parallel_sensor: bool) -> 
         blind.push(Blind { estimator: "gather", paths: "E .* S L", what });
         let what = "such light seen by a mirror or smooth glass, without two matt surfaces in succession on its way";
         blind.push(Blind { estimator: "bidirectional", paths: "E S+ (D S+)* L", what });
+        let what = "the image of such a light in mirrors or through smooth glass alone";
+        blind.push(Blind { estimator: "auto", paths: "E S+ L", what });
     }
     blind
 }
@@ -297,24 +310,28 @@ mod tests {
     #[test]
     fn coverage_follows_the_table_of_the_theory() {
         use Can::{ByLuck, No, Yes};
-        // class, hit (light, Dirac light), next event, connection, splat
+        // class, hit (light, Dirac light), next event, connection, splat; merge
         let table = [
-            ("E L", [Yes, No, No, No, Yes]),
-            ("E D L", [Yes, No, Yes, No, Yes]),
-            ("E D D L", [Yes, No, Yes, Yes, Yes]),
-            ("E S D L", [Yes, No, Yes, No, No]),
-            ("E D S L", [ByLuck, No, No, No, Yes]),
-            ("E D S D L", [Yes, No, Yes, No, Yes]),
-            ("E D D S L", [ByLuck, No, No, Yes, Yes]),
-            ("E S D D S L", [ByLuck, No, No, Yes, No]),
-            ("E S D S L", [ByLuck, No, No, No, No]),
-            ("E S S L", [Yes, No, No, No, No]),
+            ("E L", [Yes, No, No, No, Yes, No]),
+            ("E D L", [Yes, No, Yes, No, Yes, No]),
+            ("E D D L", [Yes, No, Yes, Yes, Yes, No]),
+            ("E S D L", [Yes, No, Yes, No, No, No]),
+            ("E D S L", [ByLuck, No, No, No, Yes, No]),
+            ("E D S D L", [Yes, No, Yes, No, Yes, No]),
+            ("E D D S L", [ByLuck, No, No, Yes, Yes, No]),
+            ("E S D D S L", [ByLuck, No, No, Yes, No, No]),
+            ("E S D S L", [ByLuck, No, No, No, No, Yes]),
+            ("E S S L", [Yes, No, No, No, No, No]),
         ];
-        for (class, [hit, hit_dirac, next_event, connect, splat]) in table {
+        for (class, [hit, hit_dirac, next_event, connect, splat, merge]) in table {
             let events = events(class);
-            assert_eq!(joins(&events, AREA), Joins { hit, next_event, connect, splat }, "{class}");
+            assert_eq!(joins(&events, AREA), Joins { hit, next_event, connect, splat, merge }, "{class}");
             let splat = if events.is_empty() { No } else { splat };
-            assert_eq!(joins(&events, POINT), Joins { hit: hit_dirac, next_event, connect, splat }, "{class}, Dirac light");
+            assert_eq!(
+                joins(&events, POINT),
+                Joins { hit: hit_dirac, next_event, connect, splat, merge },
+                "{class}, Dirac light"
+            );
         }
         let sky = Ends { infinite_light: true, parallel_sensor: true, ..AREA };
         assert_eq!(joins(&[], sky), Joins { hit: Yes, ..Joins::default() });
@@ -326,7 +343,7 @@ mod tests {
         let names = |l, lights: &[_]| blind_spots(l, lights, false).iter().map(|b| b.estimator).collect::<Vec<_>>();
         assert!(names(matt, &[(true, false), (false, false)]).is_empty());
         assert_eq!(names(glass, &[(false, false)]), ["shoot"]);
-        assert_eq!(names(glass, &[(true, false)]), ["shoot", "gather", "bidirectional"]);
+        assert_eq!(names(glass, &[(true, false)]), ["shoot", "gather", "bidirectional", "auto"]);
         assert_eq!(blind_spots(matt, &[(false, true)], true)[0].paths, "E L");
     }
 }

@@ -58,6 +58,7 @@ pub fn technique_name(technique: Technique) -> &'static str {
         Technique::NextEvent => "nee",
         Technique::Connect => "connect",
         Technique::Splat => "splat",
+        Technique::Merge => "merge",
     }
 }
 
@@ -80,7 +81,7 @@ fn entry(join: &Join, films: &[Film], energy: f64) -> Entry {
         length: join.length,
         and_longer: join.light_vertices.is_none(),
         s: join.light_vertices,
-        t: join.light_vertices.map(|s| join.length + 1 - s),
+        t: join.light_vertices.map(|s| join.length + 1 - s + u32::from(join.technique == Technique::Merge)),
         technique: technique_name(join.technique),
         weighted,
         raw,

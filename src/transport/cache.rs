@@ -1,6 +1,7 @@
-//! Light vertices kept for connections.
+//! Light vertices kept for connections and merges.
 
 use super::class::Positions;
+use super::merge::PointGrid;
 use super::mis::Partial;
 use crate::scene::{EmitterId, Surface};
 use crate::spectrum::Spectrum;
@@ -27,6 +28,8 @@ pub struct LightVertex {
     pub emitter: EmitterId,
     /// It cannot be hit.
     pub light_delta: bool,
+    /// Reached by a Dirac event: merges may end here.
+    pub merges: bool,
 }
 
 /// All light vertices of one pass, in the order of their light paths; as many pieces as jobs made
@@ -36,18 +39,27 @@ pub struct LightCache {
     pieces: Vec<Vec<LightVertex>>,
     /// Index of the first vertex of each piece; the total at the end.
     starts: Vec<u32>,
+    /// Those that merges may end at.
+    grid: PointGrid,
 }
 
 impl LightCache {
-    /// From what each job found. At most 2³² − 1 vertices are used.
-    pub fn new(pieces: Vec<Vec<LightVertex>>) -> Self {
+    /// From what each job found, to be searched within `merge_radius` (0: not at all). At most 2³² − 1
+    /// vertices are used.
+    pub fn new(pieces: Vec<Vec<LightVertex>>, merge_radius: f32) -> Self {
         let mut starts = vec![0u32];
         let mut total = 0u32;
         for p in &pieces {
             total = total.saturating_add(u32::try_from(p.len()).unwrap_or(u32::MAX));
             starts.push(total);
         }
-        Self { pieces, starts }
+        let mut cache = Self { pieces, starts, grid: PointGrid::default() };
+        if merge_radius > 0.0 {
+            let all = (0..total).zip(cache.pieces.iter().flatten());
+            let points = all.filter(|(_, v)| v.merges).map(|(i, v)| (v.surface.p, i)).collect();
+            cache.grid = PointGrid::new(points, merge_radius);
+        }
+        cache
     }
 
     /// Number of vertices.
@@ -66,5 +78,12 @@ impl LightCache {
     pub fn get(&self, i: u32) -> &LightVertex {
         let piece = self.starts.partition_point(|s| *s <= i) - 1;
         &self.pieces[piece][(i - self.starts[piece]) as usize]
+    }
+
+    /// Calls `visit` with every vertex for merges, and its index, whose squared distance from `p` is
+    /// below `radius2`, at most the square of the radius given to [`Self::new`].
+    #[inline]
+    pub fn around(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(u32, &LightVertex)) {
+        self.grid.around(p, radius2, |i| visit(i, self.get(i)));
     }
 }

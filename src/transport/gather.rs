@@ -21,6 +21,9 @@ use glam::{Vec2, Vec3};
 
 const EQUATION: Equation = Equation::Rendering;
 
+/// Vertices whose normals differ by more than about 25° do not lie on one surface.
+const SAME_SURFACE: f32 = 0.9;
+
 /// One sample of the pixel seen at `raster` (pixels of the whole film), `weight` the factor of its
 /// reconstruction filter; `lights` are this pass's light vertices.
 pub fn gather<R: Record, O: Observe>(
@@ -31,7 +34,7 @@ pub fn gather<R: Record, O: Observe>(
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
-    let start = cx.scene.sensor.sample_ray(raster, random.unit2());
+    let start = cx.scene.sensor.sample_ray(raster, random.axis2());
     follow(cx, start, weight, lights, random, tally);
 }
 
@@ -55,6 +58,7 @@ pub fn follow<R: Record, O: Observe>(
         k: 0.0,
         p: scene.sensor.density(start.d),
         delta: false,
+        may_merge: false,
         from: start.lens,
         cos_from: 1.0,
         parallel: scene.sensor.is_orthographic(),
@@ -95,11 +99,14 @@ pub fn follow<R: Record, O: Observe>(
             if plan.c > 0.0 {
                 connect(cx, &walk, &vertex, partial, lights, random, tally);
             }
+            if walk.delta && cx.merge_radius2 > 0.0 {
+                merge(cx, &walk, &vertex, partial, lights, tally);
+            }
         }
-        let (u_lobe, u) = (random.unit(), random.unit2());
+        let (u, u_lobe) = (random.axis2(), random.axis());
         let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
         tally.observe.scattered(&s);
-        walk.leave(cx, &vertex, partial, &s);
+        walk.leave(cx, &vertex, arrival, partial, &s);
         walk.classify(&plan.settings.paths, EQUATION, s.delta);
         if !walk.survives(plan, 1.0, random) {
             return;
@@ -221,7 +228,7 @@ fn next_event<R: Record, O: Observe>(
     tally: &mut Tally<'_, R, O>,
 ) {
     let (scene, plan) = (cx.scene, cx.plan);
-    let (u_pick, u) = (random.unit(), random.unit2());
+    let (u, u_pick) = (random.axis2(), random.axis());
     let length = walk.length + 2;
     if !plan.wants_length(length) {
         return;
@@ -340,4 +347,52 @@ fn connect<R: Record, O: Observe>(
         };
         finish(cx, path, value, join, y.length + 1, tally);
     }
+}
+
+/// Merges `vertex`, reached by a Dirac event, with the light vertices around it that were so as well.
+fn merge<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    vertex: &Vertex<'_>,
+    partial: Partial<f32>,
+    lights: &LightCache,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let plan = cx.plan;
+    let h = plan.settings.heuristic;
+    // Of η, the area of the disk and the number of light paths.
+    let factor = plan.light_paths as f32 * plan.inv_light_paths / cx.eta;
+    lights.around(vertex.surface.p, cx.merge_radius2, |index, y| {
+        let length = walk.length + 1 + y.length;
+        if !plan.wants_length(length) || y.surface.n_g.dot(vertex.surface.n_g).abs() < SAME_SURFACE {
+            return;
+        }
+        let Some(k) = vertex.kernel(EQUATION, y.w_back) else { return };
+        let weight = mis::merge(h, cx.eta, partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
+        // Flux per area is irradiance: the kernel's cosine is already in it.
+        let value = walk.throughput * y.throughput * k.value * (factor * weight / k.cos_g);
+        if value.is_black() {
+            return;
+        }
+        let path = Finished {
+            from_eye: plan.settings.paths.forward(walk.class, Symbol::D),
+            from_light: y.class,
+            length,
+            first_delta: walk.first_delta,
+            last_delta: y.first_delta,
+            light_delta: y.light_delta,
+        };
+        let join = Join {
+            technique: Technique::Merge,
+            weight,
+            length,
+            light: None,
+            light_delta: y.light_delta,
+            emitter: y.emitter,
+            light_vertex: index as usize,
+            lens: Vec3::ZERO,
+            value,
+        };
+        finish(cx, path, value, join, y.length + 1, tally);
+    });
 }

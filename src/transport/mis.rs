@@ -17,6 +17,12 @@
 //! to area at the predecessor. The same code serves both walkers. [Georgiev 2012], [van Antwerpen
 //! 2011] need three numbers; one less suffices because a Dirac event carries its exact density ratio.
 //!
+//! A *merge* at v_i counts a shooting vertex within a radius r as the same vertex: its density is
+//! η G_i S_i with η = Nπr², so 1 over its weight is 1 + (K_i + H_i)/η [Georgiev 2012; Hachisuka
+//! 2012]. Merges are made only between two Dirac events, where hardly any other join finds anything;
+//! that is a property of the path, so weights remain a partition. A walker learns at the Dirac event
+//! after v_i that the merge at v_i exists, and adds its term there ([`Partial::and_merge`]).
+//!
 //! The power heuristic (exponent 2) is the same recursion with every density and count squared.
 
 use std::ops::{Add, Div, Mul};
@@ -82,6 +88,13 @@ impl<R: Real> Partial<R> {
         self.a + self.b * h.raise(p_rev)
     }
 
+    /// The same where a merge is possible at the vertex before: `eta` merged light paths, `p` and `j`
+    /// as in [`Self::arrive`].
+    #[inline(always)]
+    pub fn and_merge(self, h: Heuristic, eta: R, p: R, j: R) -> Self {
+        Self { a: self.a, b: self.b + h.raise(eta) * h.raise(j) / h.raise(p) }
+    }
+
     /// The sum after a Dirac event: no join can end there, and the reverse density is the
     /// probability of the lobe times the ratio of the Dirac functions.
     #[inline(always)]
@@ -121,4 +134,11 @@ pub fn splat<R: Real>(h: Heuristic, n: R, g1: R, sum: R) -> R {
 #[inline(always)]
 pub fn connect<R: Real>(h: Heuristic, c: R, s: R, k: R, g: R, l: R) -> R {
     share(h.raise(c), h.raise(s) * k + h.raise(g) * l)
+}
+
+/// Weight of a merge of the vertex of a gathering walk (sum `k`) with one of a shooting walk (sum `l`);
+/// `eta` is N times the area in which vertices are merged.
+#[inline(always)]
+pub fn merge<R: Real>(h: Heuristic, eta: R, k: R, l: R) -> R {
+    share(h.raise(eta), k + l)
 }

@@ -1,10 +1,11 @@
 //! The theory: `L = Lᵉ + τL`, `W = Wᵉ + τ'W`, and the measurement `Φ = ⟨L, Wᵉ⟩ = ⟨Lᵉ, W⟩`.
 //!
 //! A path `v_0 v_1 … v_k` runs from the lens `v_0` to a light point `v_k`. The gathering walker makes
-//! vertices from `v_1` upwards, the shooting walker from `v_{k−1}` downwards, and four joins turn
+//! vertices from `v_1` upwards, the shooting walker from `v_{k−1}` downwards, and five joins turn
 //! subpaths into whole paths: a *hit* (the gathering walk arrives on a light), a *next event* (it
-//! picks a light point), a *splat* (the shooting walk is seen by the lens) and a *connection* (a
-//! vertex of one is joined to a vertex of the other). Each path is weighted by multiple importance
+//! picks a light point), a *splat* (the shooting walk is seen by the lens), a *connection* (a
+//! vertex of one is joined to a vertex of the other) and a *merge* (vertices of both are so near to
+//! each other that they count as one; only between Dirac events). Each path is weighted by multiple importance
 //! sampling over all joins that could have made it ([`mis`]).
 //!
 //! - [`settings`]: which joins, how many of each, which paths.
@@ -14,12 +15,13 @@
 //! - [`walk`]: one step of either walker.
 //! - [`gather`], [`shoot`]: the two walks, alike on purpose.
 //! - [`recursive`]: part of the coupling, or none: recursive ray tracing, local illumination.
-//! - [`cache`]: light vertices kept for connections.
+//! - [`cache`], [`merge`]: light vertices kept for connections and merges.
 //! - [`mod@reference`]: the same weights the slow way, for tests.
 
 pub mod cache;
 pub mod class;
 pub mod gather;
+pub mod merge;
 pub mod mis;
 pub mod mutant;
 pub mod recursive;
@@ -46,6 +48,8 @@ pub enum Technique {
     Connect,
     /// A shooting vertex (or a light point) was seen by the lens: t = 1.
     Splat,
+    /// A gathering vertex and a shooting vertex near it count as one, between Dirac events.
+    Merge,
 }
 
 /// One weighted path of a measurement.

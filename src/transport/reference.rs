@@ -2,7 +2,7 @@
 //! own `density` functions, every join's density is the product of its definition.
 //!
 //! ```text
-//! hit  G_{k−1} g_k      next event  G_{k−1} ν      connection  c G_i S_{i+1}      splat  N S_1
+//! hit  G_{k−1} g_k    next event  G_{k−1} ν    connection  c G_i S_{i+1}    splat  N S_1    merge  η G_i S_i
 //! ```
 //!
 //! with `G_i = g_1 … g_i` and `S_i = s_i … s_k`. In f64 and quadratic in the length: the recursion of
@@ -11,11 +11,13 @@
 use super::mis;
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
-use super::walk::{Join, Observe};
+use super::walk::{Context, Join, Observe};
 use super::{Technique, cache::LightVertex};
 use crate::scene::emitter::{Emission, EmitterPoint};
 use crate::scene::{Scene, Surface};
+use crate::spectrum::Spectrum;
 use glam::Vec3;
+use std::sync::Arc;
 
 /// A Dirac event in the middle of a path.
 #[derive(Clone, Copy, Debug)]
@@ -133,8 +135,8 @@ impl Path {
     }
 
     /// Weight of every join that could have made this path (k ≥ 2).
-    pub fn weights(&self, scene: &Scene, plan: &Plan) -> Vec<(JoinKey, f64)> {
-        weights(&self.densities(scene, plan), plan)
+    pub fn weights(&self, cx: Context<'_>) -> Vec<(JoinKey, f64)> {
+        weights(&self.densities(cx.scene, cx.plan), cx.plan, f64::from(cx.eta))
     }
 }
 
@@ -144,8 +146,8 @@ fn jacobian(from: Vec3, to: &Surface) -> f64 {
     f64::from((d.normalize()).dot(to.n_g).abs()) / f64::from(d.length_squared())
 }
 
-/// Weights from the products of densities.
-pub fn weights(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
+/// Weights from the products of densities; `eta` as in [`Context`].
+pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let h = plan.settings.heuristic;
@@ -168,6 +170,9 @@ pub fn weights(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
     if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), f64::from(plan.n) * shot(1)));
     }
+    for i in (2..k - 1).filter(|i| merges_at(d, *i, eta)) {
+        joins.push(((Technique::Merge, k - i + 1), eta * gathered(i) * shot(i)));
+    }
     let total: f64 = joins.iter().map(|j| h.raise(j.1)).sum();
     for j in &mut joins {
         j.1 = if total > 0.0 { h.raise(j.1) / total } else { 0.0 };
@@ -175,8 +180,13 @@ pub fn weights(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
     joins
 }
 
+/// Whether v_i can be a merged vertex: between two Dirac events.
+fn merges_at(d: &Densities, i: usize, eta: f64) -> bool {
+    eta > 0.0 && d.delta[i - 1] && !d.delta[i] && d.delta[i + 1]
+}
+
 /// The same weights by the recursion of [`mis`], on numbers instead of walks.
-pub fn weights_by_recursion(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
+pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let h = plan.settings.heuristic;
@@ -201,6 +211,9 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
             c
         };
         *arrived = mis::Partial::arrive(h, count, d.g[i], 1.0, sum);
+        if i > 2 && merges_at(d, i - 1, eta) {
+            *arrived = arrived.and_merge(h, eta, d.g[i], 1.0);
+        }
         sum = resolve(*arrived, i, if i > 1 { d.s[i - 1] } else { 0.0 });
     }
     let e = d.s[k] * d.s[k - 1];
@@ -214,6 +227,9 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
             c
         };
         shoot[i] = mis::Partial::arrive(h, count, d.s[i], 1.0, sum);
+        if i + 2 < k && merges_at(d, i + 1, eta) {
+            shoot[i] = shoot[i].and_merge(h, eta, d.s[i], 1.0);
+        }
         sum = resolve(shoot[i], i, d.g[i + 1]);
     }
     let k_at = |i: usize| resolve(gather[i], i, if i > 1 { d.s[i - 1] } else { 0.0 });
@@ -236,6 +252,9 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan) -> Vec<(JoinKey, f64)> {
     if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), mis::splat(h, n, d.g[1], h_at(1))));
     }
+    for i in (2..k - 1).filter(|i| merges_at(d, *i, eta)) {
+        joins.push(((Technique::Merge, k - i + 1), mis::merge(h, eta, k_at(i), h_at(i))));
+    }
     joins
 }
 
@@ -248,7 +267,12 @@ pub struct Testimony {
     pub key: JoinKey,
     /// The weight that the walk used.
     pub weight: f32,
+    /// What the join added to the measurement.
+    pub value: Spectrum,
 }
+
+/// A light subpath: vertices from the light end, the light point, whether that cannot be hit.
+pub type Subpath = (Vec<PathVertex>, EmitterPoint, bool);
 
 /// Watches walks and rebuilds the paths of length ≥ 2 that they finish.
 #[derive(Debug, Default)]
@@ -256,7 +280,7 @@ pub struct Witness {
     /// What was seen.
     pub seen: Vec<Testimony>,
     /// Light subpaths of the cache's vertices, light end first.
-    subpaths: Vec<(Vec<PathVertex>, EmitterPoint, bool)>,
+    subpaths: Arc<Vec<Subpath>>,
     lens: Vec3,
     light: Option<(EmitterPoint, bool)>,
     vertices: Vec<PathVertex>,
@@ -269,9 +293,19 @@ impl Witness {
         self.shooting = shooting;
     }
 
+    /// Watches gathering walks that join these light subpaths, one for each vertex of the cache.
+    pub fn with_subpaths(subpaths: Arc<Vec<Subpath>>) -> Self {
+        Self { subpaths, ..Self::default() }
+    }
+
+    /// The light subpaths of the vertices that went into the cache.
+    pub fn into_subpaths(self) -> Vec<Subpath> {
+        Arc::unwrap_or_clone(self.subpaths)
+    }
+
     /// Forgets the light vertices of the pass before.
     pub fn next_pass(&mut self) {
-        self.subpaths.clear();
+        self.subpaths = Arc::default();
     }
 
     /// The whole path of a join and the number of vertices that shooting made.
@@ -282,10 +316,12 @@ impl Witness {
                 let light = *join.light?;
                 Path { lens: self.lens, vertices: self.vertices.clone(), light, light_delta: join.light_delta }
             }
-            Technique::Connect => {
+            Technique::Connect | Technique::Merge => {
                 let (sub, light, light_delta) = self.subpaths.get(join.light_vertex)?;
                 let mut vertices = self.vertices.clone();
-                vertices.extend(sub.iter().rev().copied());
+                // The merged vertex is in both.
+                let merged = usize::from(join.technique == Technique::Merge);
+                vertices.extend(sub.iter().rev().skip(merged).copied());
                 Path { lens: self.lens, vertices, light: *light, light_delta: *light_delta }
             }
             Technique::Splat => {
@@ -297,7 +333,7 @@ impl Witness {
         let s = match join.technique {
             Technique::Hit => 0,
             Technique::NextEvent => 1,
-            Technique::Connect => self.subpaths.get(join.light_vertex)?.0.len() + 1,
+            Technique::Connect | Technique::Merge => self.subpaths.get(join.light_vertex)?.0.len() + 1,
             Technique::Splat => k,
         };
         Some((path, s))
@@ -317,7 +353,7 @@ impl Observe for Witness {
 
     fn cached(&mut self, _vertex: &LightVertex) {
         let (light, delta) = self.light.expect("only shooting walks fill the cache");
-        self.subpaths.push((self.vertices.clone(), light, delta));
+        Arc::make_mut(&mut self.subpaths).push((self.vertices.clone(), light, delta));
     }
 
     fn scattered(&mut self, s: &Scatter) {
@@ -336,7 +372,7 @@ impl Observe for Witness {
             return;
         }
         if let Some((path, s)) = self.whole(&join) {
-            self.seen.push(Testimony { path, key: (join.technique, s), weight: join.weight });
+            self.seen.push(Testimony { path, key: (join.technique, s), weight: join.weight, value: join.value });
         }
     }
 }

@@ -16,42 +16,55 @@ pub struct Techniques {
     pub splat: bool,
     /// Gathering vertices are joined to shooting vertices.
     pub connect: bool,
+    /// Gathering vertices between Dirac events are merged with shooting vertices near them: biased by
+    /// a radius that shrinks from pass to pass, so consistent.
+    pub merge: bool,
 }
 
 impl Techniques {
     /// Hits and next events (path tracing, Kajiya 1986).
-    pub const GATHER: Self = Self { hit: true, next_event: true, splat: false, connect: false };
+    pub const GATHER: Self = Self { hit: true, next_event: true, splat: false, connect: false, merge: false };
     /// Splats (light tracing, Arvo 1986).
-    pub const SHOOT: Self = Self { hit: false, next_event: false, splat: true, connect: false };
-    /// All four (bidirectional path tracing, Lafortune 1993, Veach 1994).
-    pub const BIDIRECTIONAL: Self = Self { hit: true, next_event: true, splat: true, connect: true };
+    pub const SHOOT: Self = Self { hit: false, next_event: false, splat: true, connect: false, merge: false };
+    /// All that are unbiased (bidirectional path tracing, Lafortune 1993, Veach 1994).
+    pub const BIDIRECTIONAL: Self = Self { hit: true, next_event: true, splat: true, connect: true, merge: false };
+    /// All five.
+    pub const ALL: Self = Self { merge: true, ..Self::BIDIRECTIONAL };
 
-    /// From a list such as `hit,nee,splat,connect`; the unknown name is the error.
+    /// From a list such as `hit,nee,splat,connect,merge`; the unknown name is the error.
     pub fn parse(list: &str) -> Result<Self, String> {
-        let mut t = Self { hit: false, next_event: false, splat: false, connect: false };
+        let mut t = Self { hit: false, next_event: false, splat: false, connect: false, merge: false };
         for name in list.split(',').map(str::trim).filter(|s| !s.is_empty()) {
             match name {
                 "hit" => t.hit = true,
                 "nee" | "next-event" => t.next_event = true,
                 "splat" => t.splat = true,
                 "connect" => t.connect = true,
+                "merge" => t.merge = true,
                 other => return Err(other.to_owned()),
             }
         }
         Ok(t)
     }
 
+    /// As a list for people.
+    pub fn names(self) -> String {
+        let on = [self.hit, self.next_event, self.splat, self.connect, self.merge];
+        let names: Vec<&str> = Self::NAMES.into_iter().zip(on).filter(|n| n.1).map(|n| n.0).collect();
+        names.join(", ")
+    }
+
     /// The names [`Techniques::parse`] knows.
-    pub const NAMES: [&str; 4] = ["hit", "nee", "splat", "connect"];
+    pub const NAMES: [&str; 5] = ["hit", "nee", "splat", "connect", "merge"];
 
     /// A gathering walk is needed.
     pub fn gathers(self) -> bool {
-        self.hit || self.next_event || self.connect
+        self.hit || self.next_event || self.connect || self.merge
     }
 
     /// A shooting walk is needed.
     pub fn shoots(self) -> bool {
-        self.splat || self.connect
+        self.splat || self.connect || self.merge
     }
 }
 
@@ -91,10 +104,16 @@ pub struct Settings {
     pub light_paths: Option<u32>,
     /// Connections per gathering vertex.
     pub connections: u32,
+    /// Radius of merges in the first pass; `None` = about two pixels of what is merged.
+    pub merge_radius: Option<f32>,
+    /// A pilot chooses which of the allowed joins are used, and how many light paths.
+    pub automatic: bool,
     /// Light paths start where a pilot found that they matter.
     pub guided: bool,
     /// Classes of paths that count.
     pub paths: PathFilter,
+    /// Walks fill the space of their first decisions evenly.
+    pub stratified: bool,
     /// Seed of all random numbers.
     pub seed: u64,
 }
@@ -111,8 +130,11 @@ impl Default for Settings {
             hide_emitters: false,
             light_paths: None,
             connections: 1,
+            merge_radius: None,
+            automatic: false,
             guided: true,
             paths: PathFilter::default(),
+            stratified: true,
             seed: 0,
         }
     }
@@ -130,6 +152,8 @@ pub struct Plan {
     /// c of the weights: connections per camera sample and light vertex, with the mean number of
     /// light vertices of the pilot (not this pass's own, which depends on its light paths).
     pub c: f32,
+    /// Radius of merges in the first pass; 0 where nothing is merged.
+    pub merge_radius: f32,
     /// Reverse densities matter: both walkers take part in the weights.
     pub two_sided: bool,
     /// Shooting makes paths of length 1 (hits are off).
@@ -169,13 +193,25 @@ impl Plan {
             light_paths,
             n,
             c,
-            two_sided: (n > 0.0 || c > 0.0) && t.gathers(),
+            merge_radius: if t.merge { settings.merge_radius.unwrap_or(0.0) } else { 0.0 },
+            two_sided: light_paths > 0 && t.gathers(),
             splat_emitters: t.splat && !t.hit,
             splat_direct: t.splat && !t.next_event,
             inv_light_paths: if light_paths > 0 { 1.0 / normaliser as f32 } else { 0.0 },
             guide: Guide::default(),
             settings,
         }
+    }
+
+    /// Radius in which pass `pass` merges: its square falls with the cube root of the number of the pass,
+    /// so that bias and variance of the mean both vanish [Knaus & Zwicker 2011, eq. 15].
+    pub fn merge_radius(&self, pass: u64) -> f32 {
+        self.merge_radius * ((pass + 1) as f32).powf(-1.0 / 6.0)
+    }
+
+    /// Shooting walks leave vertices for gathering walks.
+    pub fn keeps_vertices(&self) -> bool {
+        self.c > 0.0 || self.merge_radius > 0.0
     }
 
     /// Whether a finished path counts.

@@ -1,7 +1,7 @@
 //! The shooting walk: expands `W = Wᵉ + τ'W` from the lights.
 //!
 //! With splats alone this is light tracing [Arvo 1986; Dutré 1993]; its vertices also feed the
-//! cache that gathering walks connect to.
+//! cache that gathering walks connect to and merge with.
 
 use super::cache::LightVertex;
 use super::class::{Finished, Symbol};
@@ -20,7 +20,7 @@ use glam::Vec3;
 
 const EQUATION: Equation = Equation::Potential;
 
-/// One light path; its vertices are appended to `cache` where connections want them.
+/// One light path; its vertices are appended to `cache` where connections or merges want them.
 pub fn shoot<R: Record, O: Observe>(
     cx: Context<'_>,
     cache: Option<&mut Vec<LightVertex>>,
@@ -31,7 +31,8 @@ pub fn shoot<R: Record, O: Observe>(
     if plan.splat_emitters && plan.wants_length(1) {
         splat_emitter(cx, random, tally);
     }
-    let (u_pick, u_position, u_direction) = (random.unit(), random.unit2(), random.unit2());
+    // Direction and position are the four axes that are most evenly filled.
+    let (u_direction, u_position, u_pick) = (random.axis2(), random.axis2(), random.axis());
     let Some(start) = scene.lights.sample_emission(&scene.geometry, &plan.guide, u_pick, u_position, u_direction) else {
         tally.rays.shoot_walks += 1;
         return;
@@ -61,6 +62,7 @@ pub fn emit<R: Record, O: Observe>(
         k: if hits { 1.0 / h.raise(d.p_k) } else { 0.0 },
         p: d.p_next,
         delta: false,
+        may_merge: false,
         from: start.point.y,
         cos_from,
         parallel: start.infinite,
@@ -98,6 +100,7 @@ pub fn emit<R: Record, O: Observe>(
             }
             if let Some(cache) = cache.as_mut()
                 && length + 2 <= plan.settings.max_length
+                && (plan.settings.techniques.connect || walk.delta)
             {
                 cache.push(LightVertex {
                     surface,
@@ -109,6 +112,7 @@ pub fn emit<R: Record, O: Observe>(
                     first_delta: walk.first_delta,
                     emitter: start.point.emitter,
                     light_delta: start.delta,
+                    merges: walk.delta,
                 });
                 if let Some(v) = cache.last() {
                     tally.observe.cached(v);
@@ -119,10 +123,10 @@ pub fn emit<R: Record, O: Observe>(
         if length + 2 > plan.settings.max_length {
             return;
         }
-        let (u_lobe, u) = (random.unit(), random.unit2());
+        let (u_lobe, u) = (random.axis(), random.axis2());
         let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
         tally.observe.scattered(&s);
-        walk.leave(cx, &vertex, partial, &s);
+        walk.leave(cx, &vertex, arrival, partial, &s);
         // Radiance is scaled by η² across a boundary, flux is not: roulette looks at flux.
         walk.eta = 1.0;
         walk.classify(&plan.settings.paths, EQUATION, s.delta);

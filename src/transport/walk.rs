@@ -26,6 +26,19 @@ pub struct Context<'a> {
     pub scene: &'a Scene,
     /// Which joins, how many.
     pub plan: &'a Plan,
+    /// Square of the radius in which this pass merges; 0 where it does not.
+    pub merge_radius2: f32,
+    /// η of this pass: light paths times the area in which their vertices are merged.
+    pub eta: f32,
+}
+
+impl<'a> Context<'a> {
+    /// For one pass of a render.
+    pub fn new(scene: &'a Scene, plan: &'a Plan, pass: u64) -> Self {
+        let merge_radius2 = plan.merge_radius(pass).powi(2);
+        let eta = plan.light_paths as f32 * std::f32::consts::PI * merge_radius2;
+        Self { scene, plan, merge_radius2, eta }
+    }
 }
 
 /// State of a walk on its way from one vertex to the next.
@@ -40,6 +53,8 @@ pub struct Walk {
     pub p: f32,
     /// The vertex that was left scattered by a Dirac event.
     pub delta: bool,
+    /// It did not, but the one before it did: a merge is possible there if the next event is a Dirac event.
+    pub may_merge: bool,
     /// Position of the vertex that was left.
     pub from: Vec3,
     /// Its geometric cosine towards the direction taken; 1 for a light at infinity.
@@ -86,10 +101,18 @@ impl Walk {
 
     /// Leaves `vertex` along a sampled direction.
     #[inline]
-    pub fn leave(&mut self, cx: Context<'_>, vertex: &Vertex<'_>, partial: Partial<f32>, s: &Scatter) {
+    pub fn leave(&mut self, cx: Context<'_>, vertex: &Vertex<'_>, arrival: Arrival, mut partial: Partial<f32>, s: &Scatter) {
         let h = cx.plan.settings.heuristic;
         self.throughput *= s.weight;
-        self.k = if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
+        self.k = if s.delta {
+            if self.may_merge {
+                partial = partial.and_merge(h, cx.eta, arrival.p_a, self.cos_from * arrival.inv_d2);
+            }
+            partial.at_delta(h, s.p_rev, s.dirac_ratio)
+        } else {
+            partial.at(h, s.p_rev)
+        };
+        self.may_merge = self.delta && !s.delta;
         self.p = s.p;
         self.delta = s.delta;
         self.from = vertex.surface.p;
@@ -176,7 +199,7 @@ pub struct Join<'a> {
     pub emitter: EmitterId,
     /// It cannot be hit.
     pub light_delta: bool,
-    /// Index in the cache of the light vertex of a connection.
+    /// Index in the cache of the light vertex of a connection or a merge.
     pub light_vertex: usize,
     /// The lens point of a splat.
     pub lens: Vec3,

@@ -71,7 +71,7 @@ fn measured_error(world: &mut Scene, mesh: &Elements, radiance: &[Rgb], points: 
             let mut random = Random::new(Family::Other, next as u64, 0, 7);
             let s = mesh.point(world, i, random.unit2());
             world.sensor = keyhole(s.p, if mesh.is_front(i) { s.n_g } else { -s.n_g });
-            let cx = Context { scene: world, plan: &plan };
+            let cx = Context::new(world, &plan, 0);
             let [a, b] = [0, 1].map(|_| {
                 let mut sum = Sum::default();
                 let mut rays = RayCounts::default();

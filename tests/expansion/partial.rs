@@ -30,7 +30,7 @@ fn at(world: &Scene, estimator: Estimator, x: u32, y: u32) -> f64 {
     let (mut total, mut rays) = (Total(0.0), RayCounts::default());
     let mut tally = Tally { record: &mut total, rays: &mut rays, observe: &mut () };
     let mut random = Random::new(Family::Gather, u64::from(y * 1000 + x), 0, 0);
-    let cx = Context { scene: world, plan: &plan };
+    let cx = Context::new(world, &plan, 0);
     recursive(
         cx,
         Vec2::new(x as f32 + 0.5, y as f32 + 0.5),

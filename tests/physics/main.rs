@@ -4,6 +4,7 @@
 mod agreement;
 mod determinism;
 mod furnace;
+mod merging;
 mod scenes;
 mod splats;
 mod support;

@@ -86,7 +86,6 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
     // Any constant is a valid number of vertices for the weights.
     let plan =
         Plan { guide: learned(scene, &settings), ..Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0) };
-    let cx = Context { scene, plan: &plan };
     let renders: Vec<Vec<Vec<f64>>> = (0..effort.renders)
         .into_par_iter()
         .map(|render| {
@@ -95,15 +94,17 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
             let mut rays = RayCounts::default();
             let mut tally = Tally { record: &mut blocks, rays: &mut rays, observe: &mut () };
             for pass in render * effort.passes..(render + 1) * effort.passes {
+                // All renders of a series merge in the same radii.
+                let cx = Context::new(scene, &plan, pass % effort.passes);
                 let mut vertices: Vec<LightVertex> = Vec::new();
                 for index in 0..plan.light_paths {
                     let mut random = Random::new(Family::Shoot, u64::from(index), pass, settings.seed);
-                    shoot(cx, if plan.c > 0.0 { Some(&mut vertices) } else { None }, &mut random, &mut tally);
+                    shoot(cx, plan.keeps_vertices().then_some(&mut vertices), &mut random, &mut tally);
                 }
                 if !settings.techniques.gathers() {
                     continue;
                 }
-                let cache = LightCache::new(vec![vertices]);
+                let cache = LightCache::new(vec![vertices], plan.merge_radius(pass % effort.passes));
                 for y in crop[1]..crop[1] + crop[3] {
                     for x in crop[0]..crop[0] + crop[2] {
                         let id = u64::from(y) * u64::from(film.width) + u64::from(x);

@@ -37,10 +37,12 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
         next_event: random.unit() < 0.8,
         splat: random.unit() < 0.8,
         connect: random.unit() < 0.8,
+        merge: random.unit() < 0.8,
     };
     let heuristic = if random.unit() < 0.5 { Heuristic::Balance } else { Heuristic::Power };
     let connections = random.below(5);
-    let settings = Settings { techniques, heuristic, connections, ..Settings::default() };
+    let merge_radius = Some((random.unit() * 4.0 - 4.0).exp());
+    let settings = Settings { techniques, heuristic, connections, merge_radius, ..Settings::default() };
     let vertices = 0.5 + 3.0 * f64::from(random.unit());
     (Densities { g, s, nu, delta }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
 }
@@ -51,12 +53,13 @@ fn recursion_is_the_definition_for_100_000_random_paths() {
     let mut tested = 0;
     while tested < 100_000 {
         let (d, plan) = random_path(&mut random);
-        let defined = weights(&d, &plan);
+        let eta = f64::from(plan.light_paths) * std::f64::consts::PI * f64::from(plan.merge_radius(0)).powi(2);
+        let defined = weights(&d, &plan, eta);
         let total: f64 = defined.iter().map(|w| w.1).sum();
         if total == 0.0 {
             continue;
         }
-        let recursive = weights_by_recursion(&d, &plan);
+        let recursive = weights_by_recursion(&d, &plan, eta);
         assert_eq!(defined.len(), recursive.len());
         for ((key, a), (other, b)) in defined.iter().zip(&recursive) {
             assert_eq!(key, other);
@@ -74,7 +77,8 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
     let film = world.film.clone();
     let guide = if settings.guided { learned(&world, settings) } else { Guide::default() };
     let plan = Plan { guide, ..Plan::new(settings, 64, film.width * film.height, 2.0) };
-    let cx = Context { scene: &world, plan: &plan };
+    // One pass for all, so that one η belongs to all weights.
+    let cx = Context::new(&world, &plan, 0);
     let (mut witness, mut rays) = (Witness::default(), RayCounts::default());
     let crop = film.crop.unwrap_or([0, 0, film.width, film.height]);
     for pass in 0.. {
@@ -86,7 +90,7 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
             let mut random = Random::new(Family::Shoot, i, pass, seed());
             shoot(cx, Some(&mut vertices), &mut random, &mut tally);
         }
-        let cache = LightCache::new(vec![vertices]);
+        let cache = LightCache::new(vec![vertices], plan.merge_radius(0));
         tally.observe.expect_shooting(false);
         for i in 0..64 {
             let mut random = Random::new(Family::Gather, i, pass, seed());
@@ -109,7 +113,7 @@ fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize, rare: us
         let (world, plan, seen) = testimonies(&s.xml, settings, per_scene);
         let mut bad = Vec::new();
         for t in &seen {
-            let all = t.path.weights(&world, &plan);
+            let all = t.path.weights(Context::new(&world, &plan, 0));
             let sum: f64 = all.iter().map(|w| w.1).sum();
             assert!((sum - 1.0).abs() < 1e-9, "{}: weights sum to {sum}", s.name);
             let Some((_, w)) = all.iter().find(|w| w.0 == t.key) else {
@@ -153,5 +157,16 @@ fn walks_use_the_defined_weights_with_the_power_heuristic_and_without_some_joins
             ..Settings::default()
         };
         walks_use_the_defined_weights(&settings, 1000, 200);
+    }
+}
+
+/// The two vertices of a merge are some distance apart, so the walks know densities at one of them and
+/// the reference takes both from the other: equal to the order of radius over distance.
+#[test]
+fn walks_use_the_defined_weights_with_merges() {
+    for heuristic in [Heuristic::Balance, Heuristic::Power] {
+        let settings =
+            Settings { techniques: Techniques::ALL, heuristic, merge_radius: Some(1e-2), max_length: 8, ..Settings::default() };
+        walks_use_the_defined_weights(&settings, 3000, 200);
     }
 }

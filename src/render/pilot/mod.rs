@@ -1,5 +1,5 @@
-//! What is measured before a render starts: how many light vertices a light path leaves, and where
-//! light paths should start.
+//! What is measured before a render starts: how many light vertices a light path leaves, where light
+//! paths should start, and how far apart vertices may be to be merged.
 //!
 //! The pilot is a small bidirectional render of the same measurement: some of the pixels gather, a
 //! proportional number of light paths is shot, in rounds that double. After each round the guide of
@@ -9,14 +9,16 @@
 //! draws from its own family of random numbers and sums in a fixed order, so it is a function of
 //! scene, settings and seed alone, the same for all shards of a render.
 
+mod choice;
+
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::scene::Scene;
 use crate::scene::emitter::Emission;
 use crate::scene::emitter::guide::{Guide, Start};
 use crate::transport::cache::LightCache;
-use crate::transport::gather::gather;
-use crate::transport::settings::{Plan, Settings};
+use crate::transport::gather::{follow, gather};
+use crate::transport::settings::{Plan, Settings, Techniques};
 use crate::transport::shoot::shoot;
 use crate::transport::walk::{Context, Join, Observe, Tally};
 use crate::transport::{Contribution, RayCounts, Record, Technique};
@@ -26,19 +28,34 @@ use rayon::prelude::*;
 /// Light paths of a job.
 const JOB: u32 = 1024;
 /// Rounds, each of twice the paths of the one before.
-const ROUNDS: u32 = 5;
+const ROUNDS: u32 = 6;
 /// Least and most light paths of the last round.
-const LAST_ROUND: std::ops::RangeInclusive<u32> = 4096..=131_072;
+const LAST_ROUND: std::ops::RangeInclusive<u32> = 4096..=65_536;
 /// A light path counts for at most so many times the mean.
 const MOST: f64 = 50.0;
+/// Gathering walks that look for vertices to merge.
+const SCOUTS: u32 = 4096;
+/// Vertices are merged within so many times the side of a pixel.
+const MERGED_PIXELS: f32 = 2.0;
+/// The round before which techniques are chosen.
+const CHOICE: u32 = 3;
+/// Light paths that judge techniques, at most.
+const JUDGES: u32 = 8192;
 /// Cells of the coarse image along its longer side, at most.
 const CELLS: u32 = 64;
 
+/// Index of a cell of the coarse image.
+type Cell = u32;
+
 /// What a pilot decides.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Decisions {
+    /// What is asked for, with what was left to the pilot filled in.
+    pub settings: Settings,
     /// Mean number of light vertices per light path; 0 where connections are off.
     pub vertices_per_path: f64,
+    /// Radius of merges in the first pass; 0 where there is nothing to merge.
+    pub merge_radius: f32,
     /// Where light paths start.
     pub guide: Guide,
 }
@@ -47,17 +64,26 @@ pub struct Decisions {
 pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let t = settings.techniques;
     let connects = t.connect && settings.connections > 0;
-    if !(t.splat || connects) || scene.lights.is_empty() {
-        return Decisions::default();
+    let nothing = Decisions::nothing(settings);
+    if !(t.splat || connects || t.merge) || scene.lights.is_empty() {
+        return nothing;
     }
     let mut pilot = Pilot::new(scene, settings, crop);
-    let last = pilot.plan(0.0, Guide::default()).light_paths.clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
     // The first round only counts, since without a count there are no connections to learn from.
-    let mut decisions = Decisions::default();
+    let merge_radius = if t.merge { settings.merge_radius.unwrap_or_else(|| pilot.merge_radius()) } else { 0.0 };
+    let mut decisions = Decisions { merge_radius, ..nothing };
+    let last = (pilot.plan(&decisions).light_paths / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
     let mut learner = Guide::new(&scene.lights);
     for round in 0..ROUNDS {
         let paths = (last >> (ROUNDS - 1 - round)).max(JOB);
-        let (vertices, lessons) = pilot.round(&decisions, round, paths, connects);
+        if round == CHOICE && settings.automatic {
+            decisions.settings = choice::choose(&pilot, &decisions, paths.min(JUDGES));
+            let t = decisions.settings.techniques;
+            if !t.shoots() {
+                return Decisions::nothing(&decisions.settings);
+            }
+        }
+        let (vertices, lessons) = pilot.round(&decisions, round, paths);
         if connects {
             decisions.vertices_per_path = vertices as f64 / f64::from(paths);
         }
@@ -68,6 +94,31 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
         }
     }
     decisions
+}
+
+impl Decisions {
+    fn nothing(settings: &Settings) -> Self {
+        Self { settings: settings.clone(), vertices_per_path: 0.0, merge_radius: 0.0, guide: Guide::default() }
+    }
+
+    /// The counts that follow for a render of the crop window `crop`.
+    pub fn plan(&self, scene: &Scene, crop: [u32; 4]) -> Plan {
+        let pixels = crop[2].saturating_mul(crop[3]);
+        let film = scene.film.width.saturating_mul(scene.film.height);
+        let settings = Settings { merge_radius: Some(self.merge_radius), ..self.settings.clone() };
+        Plan { guide: self.guide.clone(), ..Plan::new(&settings, pixels, film, self.vertices_per_path) }
+    }
+
+    /// For the identity of a film: all that enters densities and weights and is not the scene's or the
+    /// settings'.
+    pub fn bytes(&self) -> Vec<u8> {
+        let Techniques { hit, next_event, splat, connect, merge } = self.settings.techniques;
+        let mut bytes = [hit, next_event, splat, connect, merge].map(u8::from).to_vec();
+        bytes.extend(self.settings.light_paths.unwrap_or(0).to_le_bytes());
+        bytes.extend(self.vertices_per_path.to_bits().to_le_bytes());
+        bytes.extend(self.merge_radius.to_bits().to_le_bytes());
+        bytes
+    }
 }
 
 struct Pilot<'a> {
@@ -90,6 +141,8 @@ struct Seen {
     value: f32,
     /// Index of the light path in the round; `u32::MAX` where none took part.
     path: u32,
+    /// Factor on the square of the value: how much more often a whole pass finds the like.
+    often: f32,
 }
 
 /// Collects what one job finds.
@@ -117,12 +170,49 @@ impl Record for Splats<'_> {
     }
 }
 
-/// Joins of a gathering walk: values with the index of the light vertex of connections.
+/// Joins of a gathering walk: values with the index of the light vertex, where one took part.
 #[derive(Default)]
-struct Joins(Vec<(f32, Option<usize>)>);
+struct Joins(Vec<(f32, Technique, usize)>);
 impl Observe for Joins {
     fn joined(&mut self, join: Join<'_>) {
-        self.0.push((join.value.mean(), (join.technique == Technique::Connect).then_some(join.light_vertex)));
+        self.0.push((join.value.mean(), join.technique, join.light_vertex));
+    }
+}
+
+/// Area across a pixel's rays of the vertices that a gathering walk could merge.
+#[derive(Default)]
+struct Footprints {
+    last: Vec3,
+    distance: f32,
+    /// Pixels per steradian, or per area where rays are parallel.
+    density: f32,
+    parallel: bool,
+    after_dirac: bool,
+    found: Vec<f32>,
+}
+impl Observe for Footprints {
+    fn started(&mut self, from: Vec3, _: Option<&Emission>) {
+        *self = Self {
+            last: from,
+            parallel: self.parallel,
+            density: self.density,
+            found: std::mem::take(&mut self.found),
+            ..Self::default()
+        };
+    }
+    fn arrived(&mut self, surface: &crate::scene::Surface) {
+        self.distance += surface.p.distance(self.last);
+        self.last = surface.p;
+        if self.after_dirac {
+            let spread = if self.parallel { 1.0 } else { self.distance * self.distance };
+            self.found.push(spread / self.density);
+        }
+    }
+    fn scattered(&mut self, s: &crate::transport::vertex::Scatter) {
+        if s.delta && self.after_dirac {
+            self.found.pop();
+        }
+        self.after_dirac = s.delta;
     }
 }
 
@@ -149,10 +239,41 @@ impl<'a> Pilot<'a> {
         Self { scene, settings, crop, step, cells, image: vec![0.0; count], weight: 0.0 }
     }
 
-    fn plan(&self, vertices_per_path: f64, guide: Guide) -> Plan {
-        let pixels = self.crop[2].saturating_mul(self.crop[3]);
-        let film = self.scene.film.width.saturating_mul(self.scene.film.height);
-        Plan { guide, ..Plan::new(self.settings, pixels, film, vertices_per_path) }
+    fn plan(&self, decisions: &Decisions) -> Plan {
+        decisions.plan(self.scene, self.crop)
+    }
+
+    /// Radius in which vertices should be merged in the first pass: some pixels as they appear on what
+    /// can be merged, so that merging blurs less than the film does.
+    fn merge_radius(&self) -> f32 {
+        let settings = Settings { techniques: Techniques { next_event: false, ..Techniques::GATHER }, ..self.settings.clone() };
+        let plan = Plan::new(&settings, 1, 1, 0.0);
+        let jobs = (0..SCOUTS / JOB).into_par_iter().map(|job| {
+            let mut footprints = Footprints { parallel: self.scene.sensor.is_orthographic(), ..Footprints::default() };
+            for index in job * JOB..(job + 1) * JOB {
+                let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 33, 0, self.settings.seed);
+                let raster = self.raster(index, SCOUTS, &mut random);
+                let start = self.scene.sensor.sample_ray(raster, random.unit2());
+                footprints.density = self.scene.sensor.density(start.d);
+                let mut tally = Tally { record: &mut Nothing, rays: &mut RayCounts::default(), observe: &mut footprints };
+                follow(Context::new(self.scene, &plan, 0), start, 1.0, &LightCache::default(), &mut random, &mut tally);
+            }
+            footprints.found
+        });
+        let mut areas: Vec<f32> = jobs.collect::<Vec<_>>().concat();
+        if areas.is_empty() {
+            return 0.0;
+        }
+        areas.sort_by(f32::total_cmp);
+        MERGED_PIXELS * areas[areas.len() / 2].sqrt()
+    }
+
+    /// A point of the `index`-th of `walks` pixels that are evenly spread in the order of rows.
+    fn raster(&self, index: u32, walks: u32, random: &mut Random) -> Vec2 {
+        let pixels = f64::from(self.crop[2]) * f64::from(self.crop[3]);
+        let pixel = ((f64::from(index) + f64::from(random.unit())) / f64::from(walks) * pixels) as u32;
+        let (x, y) = (pixel % self.crop[2], (pixel / self.crop[2]).min(self.crop[3] - 1));
+        Vec2::new((self.crop[0] + x) as f32, (self.crop[1] + y) as f32) + random.unit2()
     }
 
     /// Cell of the coarse image around a point of the film, if it is in the crop window.
@@ -172,10 +293,9 @@ impl<'a> Pilot<'a> {
     }
 
     /// One round: the number of light vertices, and what each light path that was of use is worth.
-    fn round(&mut self, so_far: &Decisions, round: u32, paths: u32, connects: bool) -> (u64, Vec<(Start, f64)>) {
-        let plan = self.plan(so_far.vertices_per_path, so_far.guide.clone());
-        let shots: Vec<Shot> =
-            (0..paths.div_ceil(JOB)).into_par_iter().map(|job| self.shoot(&plan, round, job, paths, connects)).collect();
+    fn round(&mut self, so_far: &Decisions, round: u32, paths: u32) -> (u64, Vec<(Start, f64)>) {
+        let mut plan = self.plan(so_far);
+        let shots: Vec<Shot> = (0..paths.div_ceil(JOB)).into_par_iter().map(|job| self.shoot(&plan, round, job, paths)).collect();
         let (mut seen, mut starts, mut owners, mut pieces) = (vec![], vec![], vec![], vec![]);
         for shot in shots {
             seen.extend(shot.seen);
@@ -183,14 +303,16 @@ impl<'a> Pilot<'a> {
             owners.extend(shot.owners);
             pieces.push(shot.vertices);
         }
-        let cache = LightCache::new(pieces);
+        let cache = LightCache::new(pieces, plan.merge_radius);
         // Of N light paths and P pixels per pass, n light paths and n·P/N pixels take part.
         let pixels = f64::from(self.crop[2]) * f64::from(self.crop[3]);
         let share = f64::from(paths) / f64::from(plan.light_paths.max(1));
         let walks = if plan.settings.techniques.gathers() { (pixels * share).ceil() as u32 } else { 0 };
+        // Connections and merges of the whole pass are estimated from the light vertices of this part.
+        plan.inv_light_paths = 1.0 / paths as f32;
         let gathered: Vec<Vec<Seen>> = (0..walks.div_ceil(JOB))
             .into_par_iter()
-            .map(|job| self.gather(&plan, round, (job, walks), (&cache, &owners)))
+            .map(|job| self.gather(&plan, round, (job, walks), (&cache, &owners, share as f32)))
             .collect();
         let eye_share = f64::from(walks) / pixels;
         self.weight += share;
@@ -204,17 +326,23 @@ impl<'a> Pilot<'a> {
         (u64::from(cache.len()), self.lessons(&seen, &starts))
     }
 
-    /// √Σ (v/I)² of each light path over its contributions.
-    fn lessons(&self, seen: &[Seen], starts: &[Option<Start>]) -> Vec<(Start, f64)> {
+    /// Square of the coarse image per pixel, and a little more, so that black parts do not outweigh all.
+    fn squares(&self) -> Vec<f64> {
         let cells = self.image.iter().enumerate();
         let mut squares: Vec<f64> = cells.map(|(i, sum)| (sum / (self.weight * self.cell_pixels(i as u32))).powi(2)).collect();
         let mean = self.image.iter().sum::<f64>() / (self.weight * f64::from(self.crop[2]) * f64::from(self.crop[3]));
         squares.iter_mut().for_each(|s| *s += 0.01 * mean * mean);
+        squares
+    }
+
+    /// √Σ (v/I)² of each light path over its contributions.
+    fn lessons(&self, seen: &[Seen], starts: &[Option<Start>]) -> Vec<(Start, f64)> {
+        let squares = self.squares();
         let mut worth = vec![0.0f64; starts.len()];
         for s in seen {
             let square = squares[s.cell as usize];
             if square > 0.0 {
-                worth[s.path as usize] += f64::from(s.value).powi(2) / square;
+                worth[s.path as usize] += f64::from(s.often) * f64::from(s.value).powi(2) / square;
             }
         }
         let of_use: Vec<_> = starts.iter().zip(worth).filter_map(|(s, w)| s.filter(|_| w > 0.0).map(|s| (s, w))).collect();
@@ -223,43 +351,53 @@ impl<'a> Pilot<'a> {
         of_use.into_iter().map(|(start, w)| (start, w.min(most).sqrt())).collect()
     }
 
-    fn shoot(&self, plan: &Plan, round: u32, job: u32, paths: u32, connects: bool) -> Shot {
-        let cx = Context { scene: self.scene, plan };
+    fn shoot(&self, plan: &Plan, round: u32, job: u32, paths: u32) -> Shot {
+        let cx = Context::new(self.scene, plan, 0);
+        let keeps = self.settings.techniques.connect || plan.keeps_vertices();
         let mut observe = Collect { pilot: self, seen: vec![], starts: vec![], guide: &plan.guide };
         let (mut vertices, mut owners, mut pending, mut rays) = (vec![], vec![], vec![], RayCounts::default());
         for index in job * JOB..((job + 1) * JOB).min(paths) {
             let mut random = Random::new(Family::Pilot, u64::from(index), u64::from(round), plan.settings.seed);
             observe.starts.push(None);
             let mut tally = Tally { record: &mut Splats(&mut pending), rays: &mut rays, observe: &mut observe };
-            shoot(cx, connects.then_some(&mut vertices), &mut random, &mut tally);
+            shoot(cx, keeps.then_some(&mut vertices), &mut random, &mut tally);
             owners.resize(vertices.len(), index);
             for (raster, value) in pending.drain(..).filter(|(_, value)| value.is_finite()) {
                 if let Some(cell) = self.cell(raster) {
-                    observe.seen.push(Seen { cell, value, path: index });
+                    observe.seen.push(Seen { cell, value, path: index, often: 1.0 });
                 }
             }
         }
         Shot { seen: observe.seen, starts: observe.starts, vertices, owners }
     }
 
-    /// Gathers on `walks` pixels, evenly spread in the order of rows.
-    fn gather(&self, plan: &Plan, round: u32, (job, walks): (u32, u32), (cache, owners): (&LightCache, &[u32])) -> Vec<Seen> {
-        let cx = Context { scene: self.scene, plan };
+    /// Gathers on `walks` pixels, with the light vertices of `share` of a pass.
+    fn gather(
+        &self,
+        plan: &Plan,
+        round: u32,
+        (job, walks): (u32, u32),
+        (cache, owners, share): (&LightCache, &[u32], f32),
+    ) -> Vec<Seen> {
+        let cx = Context::new(self.scene, plan, 0);
         let (mut seen, mut rays) = (vec![], RayCounts::default());
-        let pixels = f64::from(self.crop[2]) * f64::from(self.crop[3]);
         for index in job * JOB..((job + 1) * JOB).min(walks) {
             // A walk's number beyond those of all light paths: the two never share a stream.
             let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 32, u64::from(round), plan.settings.seed);
-            let pixel = ((f64::from(index) + f64::from(random.unit())) / f64::from(walks) * pixels) as u32;
-            let (x, y) = (pixel % self.crop[2], (pixel / self.crop[2]).min(self.crop[3] - 1));
-            let raster = Vec2::new((self.crop[0] + x) as f32, (self.crop[1] + y) as f32) + random.unit2();
+            let raster = self.raster(index, walks, &mut random);
             let mut joins = Joins::default();
             let mut tally = Tally { record: &mut Nothing, rays: &mut rays, observe: &mut joins };
             gather(cx, raster, 1.0, cache, &mut random, &mut tally);
             let Some(cell) = self.cell(raster) else { continue };
-            for (value, vertex) in joins.0.into_iter().filter(|(value, _)| value.is_finite()) {
-                let path = vertex.and_then(|v| owners.get(v)).copied().unwrap_or(u32::MAX);
-                seen.push(Seen { cell, value, path });
+            for (value, technique, vertex) in joins.0.into_iter().filter(|(value, ..)| value.is_finite()) {
+                // A whole pass connects each light vertex as often, since there are more of both walks; a
+                // merge finds the more gathering vertices, each to share with more light vertices.
+                let (path, often) = match technique {
+                    Technique::Connect => (owners[vertex], 1.0),
+                    Technique::Merge => (owners[vertex], share),
+                    _ => (u32::MAX, 1.0),
+                };
+                seen.push(Seen { cell, value, path, often });
             }
         }
         seen

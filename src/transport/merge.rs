@@ -1,0 +1,121 @@
+//! A hash grid over points, searched for all points near another one: the photon map of merges.
+//!
+//! Cells have twice the radius as side, so a ball meets at most eight of them. Points are sorted by
+//! the hash of their cell (counting sort, in the order given within a bucket, so the order of visits
+//! is a function of the points alone); a bucket may hold points of several cells, which the
+//! comparison of distances tells apart, and is read once even where two of the eight cells share it.
+
+use glam::{IVec3, Vec3};
+
+/// Points with a number each.
+#[derive(Clone, Debug, Default)]
+pub struct PointGrid {
+    /// Start of each bucket in `points`, one more than there are buckets; empty without points.
+    starts: Vec<u32>,
+    points: Vec<(Vec3, u32)>,
+    inv_side: f32,
+}
+
+impl PointGrid {
+    /// A grid to be searched within at most `radius` > 0.
+    pub fn new(points: Vec<(Vec3, u32)>, radius: f32) -> Self {
+        if points.is_empty() {
+            return Self::default();
+        }
+        let buckets = points.len().next_power_of_two();
+        let mut grid = Self { starts: vec![0; buckets + 1], points: vec![(Vec3::ZERO, 0); points.len()], inv_side: 0.5 / radius };
+        for (p, _) in &points {
+            let bucket = grid.bucket(grid.cell(*p));
+            grid.starts[bucket] += 1;
+        }
+        let mut sum = 0;
+        for start in &mut grid.starts {
+            sum += *start;
+            *start = sum;
+        }
+        // Filled from the end, each start moves down to where its bucket begins.
+        for point in points.into_iter().rev() {
+            let bucket = grid.bucket(grid.cell(point.0));
+            grid.starts[bucket] -= 1;
+            grid.points[grid.starts[bucket] as usize] = point;
+        }
+        grid
+    }
+
+    #[inline]
+    fn cell(&self, p: Vec3) -> IVec3 {
+        // Far away casts saturate: such points share cells, distances still tell them apart.
+        (p * self.inv_side).floor().as_ivec3()
+    }
+
+    #[inline]
+    fn bucket(&self, cell: IVec3) -> usize {
+        let mix = |h: u64, x: i32| (h ^ u64::from(x as u32)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+        mix(mix(mix(0, cell.x), cell.y), cell.z) as usize & (self.starts.len() - 2)
+    }
+
+    /// Calls `visit` with the number of every point whose squared distance from `p` is below `radius2`.
+    #[inline]
+    pub fn around(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(u32)) {
+        if self.points.is_empty() {
+            return;
+        }
+        let half = self.cell(p - Vec3::splat(0.5 / self.inv_side));
+        let mut buckets = [0usize; 8];
+        for (i, bucket) in buckets.iter_mut().enumerate() {
+            let i = i as i32;
+            *bucket = self.bucket(half.wrapping_add(IVec3::new(i & 1, (i >> 1) & 1, i >> 2)));
+        }
+        for (i, bucket) in buckets.iter().enumerate() {
+            if buckets[..i].contains(bucket) {
+                continue;
+            }
+            for (q, number) in &self.points[self.starts[*bucket] as usize..self.starts[bucket + 1] as usize] {
+                if (*q - p).length_squared() < radius2 {
+                    visit(*number);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Random, random::Family};
+
+    #[test]
+    fn finds_what_a_search_of_all_finds() {
+        let mut random = Random::new(Family::Other, 0, 0, 9);
+        let mut point = || {
+            let mut x = || 20.0 * random.unit() - 10.0;
+            Vec3::new(x(), x(), 0.1 * x())
+        };
+        let points: Vec<(Vec3, u32)> = (0..5000).map(|i| (point(), i)).collect();
+        let (radius, mut found_any) = (0.7f32, 0);
+        let grid = PointGrid::new(points.clone(), radius);
+        for _ in 0..500 {
+            let p = point();
+            for r in [radius, 0.4] {
+                let mut found = vec![];
+                grid.around(p, r * r, |i| found.push(i));
+                found.sort_unstable();
+                let all: Vec<u32> = points.iter().filter(|(q, _)| (*q - p).length_squared() < r * r).map(|(_, i)| *i).collect();
+                assert_eq!(found, all);
+                found_any += usize::from(!all.is_empty());
+            }
+        }
+        assert!(found_any > 500);
+    }
+
+    #[test]
+    fn nothing_is_near_nothing_and_far_points_do_no_harm() {
+        PointGrid::default().around(Vec3::ZERO, 1.0, |_| panic!("there is no point"));
+        let far = Vec3::new(1e30, -1e30, f32::NAN);
+        let grid = PointGrid::new(vec![(far, 0), (Vec3::ONE, 1)], 1e-6);
+        let mut found = 0;
+        grid.around(Vec3::ONE, 1e-12, |i| found += i);
+        grid.around(far, 1e-12, |_| found = 100);
+        assert_eq!(found, 1);
+    }
+}
