@@ -412,7 +412,7 @@ fn pyramid_and_light_groups_of_one_render() {
     let scene = room.changed("<shape type=\"sphere\">", "<shape type=\"sphere\" id=\"moon\">");
     let (image, pyramid) = (room.path("a.exr"), room.path("pyramid"));
     let mut command = nephroid();
-    command.arg("render").arg(&scene).args(["--light-groups", "--pyramid-length=2", "-o"]).arg(&image);
+    command.arg("render").arg(&scene).args(["-e", "bidirectional", "--light-groups", "--pyramid-length=2", "-o"]).arg(&image);
     let (code, _, err) = run(command.arg("--pyramid").arg(&pyramid));
     assert_eq!(code, 0, "{err}");
     let file = read_image(&image).expect("an image");

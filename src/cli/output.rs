@@ -61,11 +61,15 @@ impl Outputs {
 /// Memory that a render of this size takes beside the scene, in bytes.
 pub fn memory_needed(width: u32, height: u32, light_paths: Option<u32>, shoots: bool) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
-    let light = if shoots { light_paths.map_or(pixels, u64::from) } else { 0 };
+    // A pilot may choose several light paths per pixel.
+    let light = if shoots { light_paths.map_or(pixels.saturating_mul(MOST_LIGHT_PATHS), u64::from) } else { 0 };
     Film::bytes(width, height)
         .saturating_add(pixels.saturating_mul(WRITE_BYTES))
         .saturating_add(light.saturating_mul(LIGHT_PATH_BYTES))
 }
+
+/// Light paths per pixel at most.
+const MOST_LIGHT_PATHS: u64 = 4;
 
 /// Refuses a film beyond the limit, or beyond what the machine has free where no limit is given.
 pub fn check_memory(needed: u64, limit: Option<u64>, [width, height]: [u32; 2]) -> Result<(), Failure> {

@@ -99,7 +99,10 @@ pub(super) fn set_film(described: &mut Described, args: &RenderArgs) -> Result<(
         film.crop = Some([x, y, w, h]);
     }
     let [_, _, width, height] = film.crop.unwrap_or([0, 0, film.width, film.height]);
-    let shoots = matches!(args.estimator, EstimatorName::Shoot | EstimatorName::Bidirectional | EstimatorName::Scene);
+    let shoots = matches!(
+        args.estimator,
+        EstimatorName::Shoot | EstimatorName::Bidirectional | EstimatorName::Auto | EstimatorName::Scene
+    );
     let needed = output::memory_needed(width, height, args.transport.light_paths, shoots);
     output::check_memory(needed, args.max_memory, [width, height])
 }

@@ -9,7 +9,7 @@
 use crate::film::{Film, FilmError};
 use crate::scene::EmitterId;
 use crate::scene::emitter::EmitterInfo;
-use crate::transport::settings::Techniques;
+use crate::transport::settings::{Settings, Techniques};
 use crate::transport::{Contribution, Technique};
 
 /// How paths are divided.
@@ -30,6 +30,14 @@ pub enum Partition {
 }
 
 impl Partition {
+    /// The same for the joins that a pilot chose.
+    pub(super) fn chosen(&self, settings: &Settings) -> Self {
+        match self {
+            Self::Joins(j) => Self::Joins(Joins::new(settings.techniques, j.longest, settings.max_length)),
+            other => other.clone(),
+        }
+    }
+
     /// Number of films.
     pub fn parts(&self) -> usize {
         match self {

@@ -178,7 +178,7 @@ impl<'a> Render<'a> {
         let plan = decisions.plan(scene, crop);
         film.identity.decisions = decisions.bytes();
         film.identity.hash = options.identity(scene);
-        let layers = options.layers.iter().map(|p| Layers::new(p, &film)).collect::<Result<_, _>>()?;
+        let layers = options.layers.iter().map(|p| Layers::new(&p.chosen(&plan.settings), &film)).collect::<Result<_, _>>()?;
         Ok(Self { scene, plan, film, layers, filter, crop, pool, statistics: Statistics::default() })
     }
 

@@ -37,10 +37,10 @@ fn merges_find_what_hits_find() {
     assert!(energy > 0.0);
 }
 
-/// Two walls that are mirrors; the floor is lit by one and seen in the other.
+/// Two walls that are mirrors; the floor is lit by both and seen in one.
 const MIRRORS: &str = r#"<scene version="3.0.0">
-<sensor type="perspective"><float name="fov" value="30"/>
-  <transform name="to_world"><lookat origin="0, 1, 0" target="1, 0.5, 0" up="0, 1, 0"/></transform>
+<sensor type="perspective"><float name="fov" value="16"/>
+  <transform name="to_world"><lookat origin="0, 1, 0" target="1, 0.3, 0" up="0, 1, 0"/></transform>
   <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
 <emitter type="point"><point name="position" value="-0.5, 1.5, 0"/><rgb name="intensity" value="3"/></emitter>
 <bsdf type="conductor" id="mirror"><string name="material" value="none"/></bsdf>
@@ -52,17 +52,20 @@ const MIRRORS: &str = r#"<scene version="3.0.0">
 
 /// Radiance of E S D S L through pixel positions of a 32 × 32 film, by mirror images.
 fn mirrored(x: f64, y: f64) -> f64 {
-    let half = (15.0f64.to_radians()).tan();
-    let forward = glam::DVec3::new(1.0, -0.5, 0.0).normalize();
+    let half = (8.0f64.to_radians()).tan();
+    let forward = glam::DVec3::new(1.0, -0.7, 0.0).normalize();
     let left = glam::DVec3::Y.cross(forward).normalize();
     let up = forward.cross(left);
     let d = (forward + left * half * (1.0 - x / 16.0) + up * half * (1.0 - y / 16.0)).normalize();
     // The eye's image behind the mirror at x = 1 looks the other way.
     let (eye, d) = (glam::DVec3::new(2.0, 1.0, 0.0), glam::DVec3::new(-d.x, d.y, d.z));
     let p = eye - d * (eye.y / d.y);
-    // The light's image behind the mirror at x = −1.
-    let to_light = glam::DVec3::new(-1.5, 1.5, 0.0) - p;
-    0.5 / std::f64::consts::PI * 3.0 * to_light.normalize().y / to_light.length_squared()
+    // The light's images behind both mirrors.
+    let irradiance = |x| {
+        let to_light = glam::DVec3::new(x, 1.5, 0.0) - p;
+        3.0 * to_light.normalize().y / to_light.length_squared()
+    };
+    0.5 / std::f64::consts::PI * (irradiance(-1.5) + irradiance(2.5))
 }
 
 #[test]
