@@ -236,7 +236,7 @@ impl<'a> Walked<'a> {
             }
             join_names(&mut names, &watch.names);
         }
-        let cache = LightCache::new(pieces);
+        let cache = LightCache::new(pieces, self.plan.merge_radius(self.passes));
         let gathers = self.plan.settings.techniques.gathers();
         let mut tiles = std::mem::take(&mut self.tiles);
         let met: Vec<_> = tiles
@@ -256,7 +256,7 @@ impl<'a> Walked<'a> {
     }
 
     fn shoot(&self, job: u32) -> (Vec<LightVertex>, Watch<'_>) {
-        let cx = Context { scene: self.scene, plan: &self.plan };
+        let cx = Context::new(self.scene, &self.plan, self.passes);
         let (found, mut vertices, mut rays) = (Cell::new(None), Vec::new(), RayCounts::default());
         let mut watch = Watch::new(&[]);
         let mut at = At { walked: self, pixel: 0, found: &found };
@@ -265,13 +265,13 @@ impl<'a> Walked<'a> {
         let mut tally = Tally { record: &mut at, rays: &mut rays, observe: &mut observe };
         for index in paths {
             let mut random = Random::new(Family::Shoot, u64::from(index), self.passes, self.plan.settings.seed);
-            shoot(cx, (self.plan.c > 0.0).then_some(&mut vertices), &mut random, &mut tally);
+            shoot(cx, self.plan.keeps_vertices().then_some(&mut vertices), &mut random, &mut tally);
         }
         (vertices, watch)
     }
 
     fn gather(&self, index: usize, tile: &mut Tile, cache: &LightCache, events: &[Events]) -> Vec<Option<Technique>> {
-        let cx = Context { scene: self.scene, plan: &self.plan };
+        let cx = Context::new(self.scene, &self.plan, self.passes);
         let (found, mut rays) = (Cell::new(None), RayCounts::default());
         let mut watch = Watch::new(events);
         for (x, y, _) in self.layout.tile_rect(index).pixels() {
@@ -417,7 +417,12 @@ impl Observe for Observing<'_, '_> {
             _ if join.length == 1 => Events::default(),
             Technique::Splat => watch.here().reversed(),
             Technique::Connect => watch.here().joined(watch.cache.get(join.light_vertex).copied().unwrap_or_default()),
-            _ => watch.here(),
+            Technique::Merge => {
+                let both = watch.here().joined(watch.cache.get(join.light_vertex).copied().unwrap_or_default());
+                // The merged vertex is in both walks.
+                Events { count: both.count - 1, ..both }
+            }
+            Technique::Hit | Technique::NextEvent => watch.here(),
         };
         let technique = join.technique as usize;
         watch.names[technique] = Some(join.technique);
