@@ -15,7 +15,7 @@ use crate::math::random::Family;
 use crate::scene::Scene;
 use crate::transport::cache::LightCache;
 use crate::transport::gather::gather;
-use crate::transport::settings::{Plan, Settings};
+use crate::transport::settings::Settings;
 use crate::transport::shoot::shoot;
 use crate::transport::walk::{Context, Tally};
 use crate::transport::{Contribution, RayCounts, Record};
@@ -118,12 +118,9 @@ struct Tail {
 impl Tail {
     fn measure(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Self {
         let max_length = settings.max_length.min(LONGEST);
-        let settings = Settings { light_paths: Some(WALKS), min_length: 1, max_length, ..settings.clone() };
-        let decisions = pilot::decide(scene, &settings, crop);
-        let pixels = crop[2].saturating_mul(crop[3]);
-        let film_pixels = scene.film.width.saturating_mul(scene.film.height);
-        let plan = Plan { guide: decisions.guide, ..Plan::new(&settings, pixels, film_pixels, decisions.vertices_per_path) };
-        let cx = Context { scene, plan: &plan };
+        let settings = Settings { light_paths: Some(WALKS), min_length: 1, max_length, automatic: false, ..settings.clone() };
+        let plan = pilot::decide(scene, &settings, crop).plan(scene, crop);
+        let cx = Context::new(scene, &plan, 0);
         let rounds: Vec<Vec<f64>> = (0..ROUNDS).into_par_iter().map(|r| round(cx, crop, FIRST_PASS + r)).collect();
         let n = ROUNDS as f64;
         let of = |k: usize| {
@@ -178,9 +175,9 @@ fn round(cx: Context<'_>, crop: [u32; 4], pass: u64) -> Vec<f64> {
     for index in 0..plan.light_paths {
         let mut random = Random::new(Family::Pilot, u64::from(index), pass, plan.settings.seed);
         let mut tally = Tally { record: &mut sums, rays: &mut rays, observe: &mut () };
-        shoot(cx, (plan.c > 0.0).then_some(&mut vertices), &mut random, &mut tally);
+        shoot(cx, plan.keeps_vertices().then_some(&mut vertices), &mut random, &mut tally);
     }
-    let cache = LightCache::new(vec![vertices]);
+    let cache = LightCache::new(vec![vertices], plan.merge_radius(0));
     let walks = if plan.settings.techniques.gathers() { WALKS } else { 0 };
     sums.scale = 1.0 / f64::from(WALKS);
     for index in 0..walks {
