@@ -76,7 +76,7 @@ fn b1_sums_over_lights_converge_to_the_integral() {
         let (mut total, mut rays) = (Total(0.0), RayCounts::default());
         let mut tally = Tally { record: &mut total, rays: &mut rays, observe: &mut () };
         let mut random = Random::new(Family::Gather, 0, 0, 0);
-        recursive(Context { scene: &world, plan: &plan }, Vec2::splat(0.5), 1.0, true, &mut random, &mut tally);
+        recursive(Context::new(&world, &plan, 0), Vec2::splat(0.5), 1.0, true, &mut random, &mut tally);
         total.0
     };
     let exact = by_lambert();

@@ -93,7 +93,7 @@ fn a11_both_norms_hold() {
     let mut fluxes = Fluxes { weight: Spectrum::BLACK, n: 0, sums: vec![0.0; LAST + 3] };
     for i in 0..40_000 {
         let mut tally = Tally { record: &mut Nothing, rays: &mut RayCounts::default(), observe: &mut fluxes };
-        shoot(Context { scene: &world, plan: &plan }, None, &mut Random::new(Family::Other, i, 0, 0), &mut tally);
+        shoot(Context::new(&world, &plan, 0), None, &mut Random::new(Family::Other, i, 0, 0), &mut tally);
     }
     let total: f64 = fluxes.sums.iter().sum();
     // With only the panel shining radiance has a bound: its own over 1 − q.
