@@ -11,6 +11,7 @@ mod scenes;
 mod support;
 
 use nephroid::proof::adjoint::{ALPHA, Effort as Draws, adjoint};
+use nephroid::proof::residual;
 use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
@@ -143,5 +144,32 @@ fn planted_mistakes_part_the_walkers() {
         println!("{mutant:?}: p = {:.2e} without, {:.2e} with the mistake", sound.p, mistaken.p);
         assert!(sound.agree && sound.p >= ALPHA, "{mutant:?}:\n{}", sound.to_text(true, false));
         assert!(!mistaken.agree, "{mutant:?}:\n{}", mistaken.to_text(true, false));
+    }
+}
+
+/// The command `residual` notices a mistake in either walker without a second walker.
+#[test]
+fn planted_mistakes_leave_a_residual() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    for (mutant, name, walks) in [
+        (Mutant::AdjointShadingNormal, "shading normals", 32),
+        (Mutant::RefractionEtaSquared, "under water", 32),
+        (Mutant::SplatCropNormalisation, "crop window", 8),
+        (Mutant::NextEventDensity, "diffuse box", 16),
+        (Mutant::RouletteFactor, "diffuse box", 16),
+        (Mutant::AreaCosine, "diffuse box", 32),
+    ] {
+        let world = scene(&scenes::named(dir.path(), name));
+        let effort = residual::Effort { walks: Some(walks), seed: seed(), max_length: Some(6), ..Default::default() };
+        let [sound, mistaken] = [None, Some(mutant)].map(|m| {
+            plant(m);
+            let found = residual::residuals(&world, &effort);
+            plant(None);
+            found
+        });
+        println!("{mutant:?}: p = {:.2e} without, {:.2e} with the mistake", sound.p, mistaken.p);
+        assert!(sound.zero, "{mutant:?}:\n{}", sound.to_text(false));
+        assert!(!mistaken.zero, "{mutant:?}:\n{}", mistaken.to_text(false));
     }
 }

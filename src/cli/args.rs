@@ -37,6 +37,12 @@ pub enum Command {
     Bench(BenchArgs),
     /// Test on a scene that both equations measure the same, for every number of scatterings.
     Adjoint(AdjointArgs),
+    /// Test on a scene that L = Lᵉ + τL and W = Wᵉ + τ'W, at random points.
+    Residual(ResidualArgs),
+    /// Test this program against closed forms, in one table.
+    Selfcheck(SelfcheckArgs),
+    /// Show the strongest paths of a pixel, with the densities and weights of every join.
+    Explain(ExplainArgs),
 }
 
 /// How to read a scene.
@@ -380,6 +386,66 @@ pub struct AdjointArgs {
     /// The test of every block.
     #[arg(long)]
     pub blocks: bool,
+}
+
+/// Where and how much to test both equations.
+#[derive(Clone, Debug, Args)]
+pub struct ResidualArgs {
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// How much; a pass is a walk from every point.
+    #[command(flatten)]
+    pub effort: ProofArgs,
+    /// Random points of each equation.
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub points: u32,
+    /// Longest path in edges from a point on [default: the scene's max_depth, or 12].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000))]
+    pub max_length: Option<u32>,
+    /// The test of every point.
+    #[arg(long)]
+    pub each: bool,
+}
+
+/// What to test the program with.
+#[derive(Clone, Debug, Args)]
+pub struct SelfcheckArgs {
+    /// Instead, test that radiance is constant around this mesh (.obj, .ply, .serialized) in a closed scene.
+    #[arg(long, value_name = "MESH", value_hint = ValueHint::FilePath)]
+    pub mesh: Option<PathBuf>,
+    /// As JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Threads [default: all that the machine has].
+    #[arg(short = 't', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+}
+
+/// Which pixel to explain.
+#[derive(Clone, Debug, Args)]
+pub struct ExplainArgs {
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Column and row in the film, from the upper left corner.
+    #[arg(long, value_name = "X,Y", value_parser = units::pixel)]
+    pub pixel: (u32, u32),
+    /// Samples of the pixel, each with a thousand light paths.
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u64).range(2..))]
+    pub spp: u64,
+    /// Paths to show.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(..=10_000))]
+    pub show: u32,
+    /// Size of the film instead of the scene's, such as 640x480.
+    #[arg(long, value_name = "WxH", value_parser = units::size)]
+    pub size: Option<[u32; 2]>,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// As JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// How much a statistical test does.

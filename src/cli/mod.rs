@@ -87,6 +87,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Compare(args) => compare::run(args),
         Command::Bench(args) => bench::run(args, &arguments),
         Command::Adjoint(args) => proof::adjoint(args),
+        Command::Residual(args) => proof::residual(args),
+        Command::Selfcheck(args) => proof::selfcheck(args),
+        Command::Explain(args) => proof::explain(args),
     };
     ExitCode::from(match outcome {
         Ok(exit) => exit as u8,

@@ -51,6 +51,14 @@ pub fn size(text: &str) -> Result<[u32; 2], String> {
     Ok([side(w)?, side(h)?])
 }
 
+/// `X,Y` in pixels of the whole film.
+pub fn pixel(text: &str) -> Result<(u32, u32), String> {
+    let expected = || "expected column and row such as 200,120".to_owned();
+    let (x, y) = text.split_once(',').ok_or_else(expected)?;
+    let number = |s: &str| s.trim().parse().map_err(|_| expected());
+    Ok((number(x)?, number(y)?))
+}
+
 /// `X,Y,WIDTH,HEIGHT` in pixels of the whole film.
 pub fn crop(text: &str) -> Result<[u32; 4], String> {
     let expected = || "expected four whole numbers X,Y,WIDTH,HEIGHT such as 10,20,64,48".to_owned();

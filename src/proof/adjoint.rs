@@ -9,11 +9,13 @@
 //! by Welch's test, corrected for their number within a length and for the number of lengths
 //! [Šidák 1967]. Paths that a walker finds by luck are compared apart from those it always finds
 //! ([`super::blocks`]), so that what is rarely found is not taken for what is never found. A mean of few effective draws is not tested: either side gets more passes until
-//! nearly all energy can be, or the time is over; the share that was is part of the verdict.
+//! nearly all energy can be, or the time is over; the share that was is part of the verdict. Classes of
+//! next to no energy are not tested: what has not been found yet may be as large as what has.
 
 use super::blocks::{self, Series};
+use super::compare::{Estimate, compare, sides_text, worst};
 use crate::render::{Estimator, Options, RenderError};
-use crate::report::agreement::{Agreement, BlockSeries, agreement, sidak};
+use crate::report::agreement::{Agreement, BlockSeries, agreement};
 use crate::report::coverage::{Blind, Coverage};
 use crate::scene::Scene;
 use crate::transport::class::PathFilter;
@@ -26,6 +28,8 @@ pub const ALPHA: f64 = 1e-4;
 const ENOUGH: f64 = 0.98;
 /// A length with less than this share of the energy does not hold up a run.
 const FAINT: f64 = 1e-3;
+/// A class with less than this share of the energy is not tested.
+const NOTHING: f64 = 2e-4;
 /// Passes per draw to begin with: rare paths must have had a chance.
 const FIRST: u64 = 8;
 /// Longest paths where neither scene nor caller says.
@@ -52,15 +56,6 @@ impl Default for Effort {
     fn default() -> Self {
         Self { renders: 64, passes: None, time: Some(Duration::from_secs(60)), seed: 0, max_length: None, paths: None }
     }
-}
-
-/// A mean and its standard error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Estimate {
-    /// Mean over draws: radiance averaged over the film.
-    pub mean: f64,
-    /// Standard error of the mean.
-    pub standard_error: f64,
 }
 
 /// Paths of one n with the same events beside eye and light.
@@ -141,9 +136,11 @@ pub fn adjoint(scene: &Scene, effort: &Effort) -> Result<Adjoint, Refused> {
     }
     let first = s.min_length.max(1) as usize;
     draw(&mut sides, effort, first..longest + 1);
-    let terms: Vec<Term> = (first..=longest).map(|k| term(k, &sides)).collect();
+    let classes = || (first..=longest).flat_map(blocks::Class::of_length);
+    let energy: f64 = classes().map(|c| sides.iter().map(|s| Estimate::of(&s.of(c)).mean).fold(0.0, f64::max)).sum();
+    let terms: Vec<Term> = (first..=longest).map(|k| term(k, &sides, NOTHING * energy)).collect();
     let tests: Vec<f64> = terms.iter().flat_map(|t| &t.classes).filter(|c| c.tests() > 0).map(|c| c.p).collect();
-    let p = sidak(tests.iter().copied().fold(1.0, f64::min), tests.len());
+    let p = worst(&tests);
     let film = &scene.film;
     let size = film.crop.map_or([film.width, film.height], |c| [c[2], c[3]]);
     Ok(Adjoint {
@@ -223,39 +220,24 @@ fn share<'a>(classes: impl Iterator<Item = &'a Class>) -> f64 {
     if all > 0.0 { tested / all } else { 1.0 }
 }
 
-fn total(s: &BlockSeries) -> Estimate {
-    let totals = s.draws.iter().map(|d| d.iter().sum::<f64>());
-    let n = s.draws.len() as f64;
-    let mean = totals.clone().sum::<f64>() / n;
-    let variance = totals.map(|t| (t - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    Estimate { mean, standard_error: (variance / n).sqrt() }
+/// Tested if it has at least the energy `least`.
+fn class(paths: String, a: &BlockSeries, b: &BlockSeries, least: f64) -> Class {
+    let (gather, shoot) = (Estimate::of(a), Estimate::of(b));
+    let untested = || (Agreement { p: 1.0, totals: (gather.mean, shoot.mean), ..Agreement::default() }, 1.0);
+    let (blocks, p) = if gather.mean.max(shoot.mean) < least { untested() } else { compare(a, b) };
+    Class { paths, gather, shoot, z: gather.z(shoot), p, blocks }
 }
 
-fn score(a: Estimate, b: Estimate) -> f64 {
-    let error = a.standard_error.hypot(b.standard_error);
-    if error > 0.0 { (a.mean - b.mean) / error } else { 0.0 }
-}
-
-fn class(paths: String, a: &BlockSeries, b: &BlockSeries) -> Class {
-    let (gather, shoot) = (total(a), total(b));
-    let blocks = agreement(a, b);
-    // The film as one block is one test more, for small differences that all blocks share.
-    let whole = agreement(&a.pooled(), &b.pooled());
-    let smallest = blocks.tests.iter().chain(&whole.tests).map(|t| t.p).fold(1.0, f64::min);
-    let p = sidak(smallest, blocks.tests.len() + whole.tests.len());
-    Class { paths, gather, shoot, z: score(gather, shoot), p, blocks }
-}
-
-fn term(length: usize, sides: &[Series<'_>]) -> Term {
-    let (gather, shoot) = (total(&all(&sides[0], length)), total(&all(&sides[1], length)));
+fn term(length: usize, sides: &[Series<'_>], least: f64) -> Term {
+    let (gather, shoot) = (Estimate::of(&all(&sides[0], length)), Estimate::of(&all(&sides[1], length)));
     let classes: Vec<Class> = blocks::Class::of_length(length)
         .into_iter()
-        .map(|c| class(c.name(), &sides[0].of(c), &sides[1].of(c)))
+        .map(|c| class(c.name(), &sides[0].of(c), &sides[1].of(c), least))
         .filter(|c| c.gather.mean > 0.0 || c.shoot.mean > 0.0)
         .collect();
     let tested: Vec<f64> = classes.iter().filter(|c| c.tests() > 0).map(|c| c.p).collect();
-    let p = sidak(tested.iter().copied().fold(1.0, f64::min), tested.len());
-    Term { n: length as u32 - 1, gather, shoot, z: score(gather, shoot), p, energy_tested: share(classes.iter()), classes }
+    let p = worst(&tested);
+    Term { n: length as u32 - 1, gather, shoot, z: gather.z(shoot), p, energy_tested: share(classes.iter()), classes }
 }
 
 /// Draws of all classes of a length together.
@@ -281,7 +263,7 @@ impl Class {
             out,
             "   {:12}{}  {:6}  {:5.1} %",
             self.paths,
-            sides_text(self.gather, self.shoot, self.z, self.p),
+            sides_text(self.gather, self.shoot, self.p),
             self.tests(),
             100.0 * self.blocks.energy_tested
         );
@@ -303,13 +285,6 @@ impl Class {
     }
 }
 
-fn sides_text(gather: Estimate, shoot: Estimate, z: f64, p: f64) -> String {
-    format!(
-        "{:.6e} ± {:.1e}   {:.6e} ± {:.1e}  {z:+6.2}  {p:7.1e}",
-        gather.mean, gather.standard_error, shoot.mean, shoot.standard_error
-    )
-}
-
 impl Adjoint {
     /// For people; with every class where `classes`, with every block's test where `blocks`.
     pub fn to_text(&self, classes: bool, blocks: bool) -> String {
@@ -327,7 +302,7 @@ impl Adjoint {
         out.push_str("  n             gather ± SE              shoot ± SE                  z        p   tests  energy tested\n");
         for t in &self.terms {
             let tests: usize = t.classes.iter().map(Class::tests).sum();
-            let sides = sides_text(t.gather, t.shoot, t.z, t.p);
+            let sides = sides_text(t.gather, t.shoot, t.p);
             let _ = writeln!(out, "{:3}            {sides}  {tests:6}  {:5.1} %", t.n, 100.0 * t.energy_tested);
             if classes || blocks || t.p < ALPHA {
                 t.classes.iter().for_each(|c| out.push_str(&c.to_text(blocks)));

@@ -201,7 +201,7 @@ impl<'a> Series<'a> {
 
 /// Which materials have an event that is narrow without being a Dirac one; told in the middle of their
 /// textures, so that both walkers say the same of a point.
-fn narrow(scene: &Scene) -> Vec<bool> {
+pub(super) fn narrow(scene: &Scene) -> Vec<bool> {
     let narrow = |i: u32| {
         let roughness = |front| scene.materials.resolve(MaterialId(i), Vec2::splat(0.5), front).roughness();
         roughness(true).min(roughness(false)) < NARROW
@@ -211,7 +211,7 @@ fn narrow(scene: &Scene) -> Vec<bool> {
 
 /// The largest contributions of a class.
 #[derive(Clone, Debug, Default)]
-struct Top {
+pub(super) struct Top {
     values: Vec<f32>,
     /// The least of them once there are enough.
     least: f32,
@@ -220,7 +220,7 @@ struct Top {
 impl Top {
     const KEPT: usize = 128;
 
-    fn add(&mut self, value: f32) {
+    pub(super) fn add(&mut self, value: f32) {
         if value <= self.least {
             return;
         }
@@ -230,7 +230,7 @@ impl Top {
         }
     }
 
-    fn join(&mut self, other: &Self) {
+    pub(super) fn join(&mut self, other: &Self) {
         self.values.extend(&other.values);
         self.trim();
     }
@@ -245,7 +245,7 @@ impl Top {
 
     /// The largest, if the sums have a variance at all: where the tail falls off as x^(−1/k), that takes
     /// k < 1/2. k is estimated by the mean logarithm of the largest over the least of them [Hill 1975].
-    fn trusted(&self) -> Option<f64> {
+    pub(super) fn trusted(&self) -> Option<f64> {
         let (first, last) = (f64::from(*self.values.first()?), f64::from(*self.values.last()?));
         let k = self.values.iter().map(|v| (f64::from(*v) / last).ln()).sum::<f64>() / self.values.len() as f64;
         (self.values.len() < Self::KEPT || k < 0.5).then_some(first)

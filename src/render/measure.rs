@@ -7,7 +7,7 @@ use crate::scene::Scene;
 const LIGHT_PATHS: u32 = 1024;
 
 /// An estimate of Φ, linear sRGB.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Measurement {
     /// Mean over samples.
     pub mean: [f32; 3],

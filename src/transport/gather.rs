@@ -53,10 +53,12 @@ pub fn follow<R: Record, O: Observe>(
     tally.rays.gather_walks += 1;
     tally.observe.started(start.lens, None);
     let mut ray = Ray { o: start.o, d: start.d, t_max: start.t_max };
+    // A ray that is none of the sensor's has no density by it; where such a ray may start, none is asked for.
+    let p_sensor = scene.sensor.density(start.d);
     let mut walk = Walk {
         throughput: Spectrum::ONE * weight,
         k: 0.0,
-        p: scene.sensor.density(start.d),
+        p: if p_sensor > 0.0 { p_sensor } else { 1.0 },
         delta: false,
         may_merge: false,
         from: start.lens,

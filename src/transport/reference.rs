@@ -146,11 +146,10 @@ fn jacobian(from: Vec3, to: &Surface) -> f64 {
     f64::from((d.normalize()).dot(to.n_g).abs()) / f64::from(d.length_squared())
 }
 
-/// Weights from the products of densities; `eta` as in [`Context`].
-pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+/// The density of every join: how many such paths it makes per sample and product of areas; `eta` as in [`Context`].
+pub fn products(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
-    let h = plan.settings.heuristic;
     let gathered = |i: usize| d.g[1..=i].iter().product::<f64>();
     let shot = |i: usize| d.s[i..=k].iter().product::<f64>();
     let mut joins: Vec<(JoinKey, f64)> = Vec::new();
@@ -173,6 +172,13 @@ pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     for i in (2..k - 1).filter(|i| merges_at(d, *i, eta)) {
         joins.push(((Technique::Merge, k - i + 1), eta * gathered(i) * shot(i)));
     }
+    joins
+}
+
+/// Weights from the products of densities; `eta` as in [`Context`].
+pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+    let h = plan.settings.heuristic;
+    let mut joins = products(d, plan, eta);
     let total: f64 = joins.iter().map(|j| h.raise(j.1)).sum();
     for j in &mut joins {
         j.1 = if total > 0.0 { h.raise(j.1) / total } else { 0.0 };

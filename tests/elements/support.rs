@@ -1,6 +1,5 @@
-//! Small diffuse scenes, and sums over the elements of a shape.
+//! Small diffuse scenes.
 
-use nephroid::elements::{Elements, Factors};
 use nephroid::scene::Scene;
 
 /// The built scene of a text.
@@ -45,18 +44,6 @@ pub fn six_walls(look: impl Fn(usize) -> (&'static str, &'static str)) -> String
         shape("rectangle", false, &format!(r#"{turn}<scale value="0.5"/>"#), reflectance, radiance)
     };
     turns.iter().enumerate().map(wall).collect()
-}
-
-/// Form factors between the shapes of a scene.
-pub fn between_shapes(mesh: &Elements, factors: &Factors, shapes: usize) -> Vec<Vec<f64>> {
-    let mut sums = vec![vec![0.0; shapes]; shapes];
-    let mut areas = vec![0.0; shapes];
-    for i in 0..mesh.len() {
-        let a = mesh.shape(i) as usize;
-        areas[a] += mesh.area(i);
-        factors.row(i).for_each(|(j, x)| sums[a][mesh.shape(j) as usize] += x);
-    }
-    sums.iter().zip(&areas).map(|(row, area)| row.iter().map(|x| x / area).collect()).collect()
 }
 
 /// Slope of the least-squares line through (ln x, ln y).

@@ -1,8 +1,8 @@
 //! A model is not finished without its formula's source, an example, and a line in the list of tests.
 
-use crate::models::all_models;
 use nephroid::io::mitsuba::{self, LoadOptions};
 use nephroid::local::{MODEL_SOURCES, Materials};
+use nephroid::proof::scattering::models::all_models;
 use std::path::Path;
 
 fn head(source: &str) -> String {

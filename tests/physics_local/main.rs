@@ -1,12 +1,10 @@
 //! Physics of the local models: densities, energy, reciprocity, robustness, agreement with Mitsuba 3.
 //!
-//! Every test walks through the one list in `models.rs`, so that a new model is covered by adding a
+//! Every test walks through the one list in `nephroid::proof::scattering::models`, so that a new model is covered by adding a
 //! line there; a model without a line, a source or an example fails `documents`.
 
-mod chi2;
 mod documents;
 mod energy;
-mod models;
 mod reciprocity;
 mod reference;
 mod robustness;

@@ -1,8 +1,8 @@
 //! Values and densities of Mitsuba 3.9.1 for the same models, made by `reference.py`.
 
-use crate::models::all_models;
 use glam::Vec3;
 use nephroid::local::Equation;
+use nephroid::proof::scattering::models::all_models;
 
 /// The file to compare with: that of the repository, or a larger one made by the same script.
 fn lines() -> String {

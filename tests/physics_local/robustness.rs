@@ -1,9 +1,9 @@
 //! No NaN, no infinity, nothing negative, for any direction, and every wrong parameter a problem.
 
-use crate::models::{all_models, described, grey, images};
 use glam::{Vec2, Vec3};
 use nephroid::describe::{BsdfDescription, BsdfId, BsdfModel, ImageId, MicrofacetDescription, Place, TextureDescription};
 use nephroid::local::{Equation, Evaluation, Materials};
+use nephroid::proof::scattering::models::{all_models, described, grey, images};
 use proptest::prelude::*;
 
 /// Heights from grazing to normal, both exact.

@@ -1,74 +1,21 @@
 //! `density`: samplers follow their densities, and all ways of asking for one number agree.
 
-use crate::chi2::{Window, p_value};
-use crate::models::{Case, all_models, directions};
 use glam::Vec3;
-use nephroid::local::{Equation, Sample};
+use nephroid::local::Equation;
 use nephroid::math::Random;
 use nephroid::math::random::Family;
+use nephroid::proof::scattering::models::{Case, all_models, directions};
+use nephroid::proof::scattering::{EQUATIONS, densities, draw, least_smooth_roughness, windows};
 
-const EQUATIONS: [Equation; 2] = [Equation::Rendering, Equation::Potential];
 const SAMPLES: usize = 40_000;
-
-fn draw(case: &Case, equation: Equation, w_back: Vec3, seed: u64, n: usize) -> Vec<Option<Sample>> {
-    let closure = case.at(w_back);
-    let mut random = Random::new(Family::Other, seed, 0, 7);
-    (0..n).map(|_| closure.sample(equation, w_back, random.unit(), random.unit2())).collect()
-}
-
-/// Windows that resolve the model: both sides of the surface for wide lobes; the facets that mirror
-/// where lobes are narrow or grazing; the surroundings of the refracted direction.
-fn windows(case: &Case, w_back: Vec3, samples: &[Option<Sample>]) -> Vec<Window> {
-    let closure = case.at(w_back);
-    let alpha = least_smooth_roughness(case, w_back);
-    if closure.is_delta() {
-        return vec![];
-    }
-    let through = samples.iter().flatten().filter(|s| !s.delta && s.w_next.z * w_back.z < 0.0);
-    let axis: Vec3 = through.map(|s| s.w_next).sum();
-    let reflected = if alpha >= 0.15 && w_back.z.abs() > 0.05 {
-        Window::Side(w_back.z.signum())
-    } else {
-        Window::Facets(w_back, 6.0 * alpha)
-    };
-    let refracted = match axis.length() > 0.01 * samples.len() as f32 {
-        false => None,
-        true if alpha >= 0.15 => Some(Window::Side(-w_back.z.signum())),
-        true => Some(Window::around(axis.normalize(), (6.0 * alpha).min(0.9))),
-    };
-    [reflected].into_iter().chain(refracted).collect()
-}
-
-/// As `roughness`, which is 0 where a smooth coat covers something rough.
-fn least_smooth_roughness(case: &Case, w_back: Vec3) -> f32 {
-    let alpha = case.at(w_back).roughness();
-    if alpha > 0.0 { alpha } else { 1.0 }
-}
 
 #[test]
 fn density_chi2_and_integral() {
-    let mut results = Vec::new();
-    for (c, case) in all_models().iter().enumerate() {
-        for (d, w_back) in directions().into_iter().enumerate() {
-            let equation = EQUATIONS[(c + d) % 2];
-            let samples = draw(case, equation, w_back, (100 * c + d) as u64, SAMPLES);
-            let closure = case.at(w_back);
-            for window in windows(case, w_back, &samples) {
-                let expected = window.integrate(|w| f64::from(closure.density(w_back, w)));
-                assert!(
-                    expected.iter().sum::<f64>() < 1.0 + 5e-3,
-                    "{} {w_back}: integral {}",
-                    case.name,
-                    expected.iter().sum::<f64>()
-                );
-                let counts = window.count(samples.iter().map(|s| s.filter(|s| !s.delta).map(|s| s.w_next)));
-                results.push((p_value(&expected, &counts), case.name, w_back));
-            }
-        }
-    }
+    let cases = all_models();
+    let results: Vec<_> = cases.iter().enumerate().flat_map(|(c, case)| densities(c, case, SAMPLES)).collect();
     assert!(results.len() > 200, "{} configurations", results.len());
     let least = 1e-4 / results.len() as f64;
-    let failed: Vec<_> = results.iter().filter(|(p, ..)| p.is_nan() || *p < least).collect();
+    let failed: Vec<_> = results.iter().filter(|t| !(t.p >= least && t.integral < 1.0 + 5e-3)).collect();
     assert!(failed.is_empty(), "{failed:#?}");
 }
 

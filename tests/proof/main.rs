@@ -2,6 +2,10 @@
 //! forms. docs/theory.md says which test holds which statement.
 
 mod adjoint;
+mod caustics;
+mod cli;
+mod explain;
+mod residual;
 #[path = "../physics/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;

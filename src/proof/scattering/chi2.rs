@@ -1,8 +1,8 @@
 //! A χ² test of a sampler against its density, on cells of any map of the unit square.
 
+use crate::math::Frame;
+use crate::math::warp::disk_concentric;
 use glam::{Vec2, Vec3};
-use nephroid::math::Frame;
-use nephroid::math::warp::disk_concentric;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f32::consts::PI;
 
@@ -23,6 +23,7 @@ pub enum Window {
 }
 
 impl Window {
+    /// Around an axis.
     pub fn around(axis: Vec3, radius: f32) -> Self {
         Self::Around(Frame::around(axis), radius)
     }
@@ -151,29 +152,34 @@ pub fn p_value(expected: &[f64], (observed, rest): &(Vec<u64>, u64)) -> f64 {
     1.0 - ChiSquared::new((cells - 1) as f64).expect("positive").cdf(chi2)
 }
 
-#[test]
-fn windows_find_their_own_directions() {
-    let axis = Vec3::new(0.6, 0.0, 0.8);
-    for window in [Window::Side(1.0), Window::Side(-1.0), Window::around(axis, 0.4), Window::Facets(axis, 0.5)] {
-        for i in 0..100 {
-            let p = Vec2::new(0.01 + 0.098 * (i % 11) as f32, 0.01 + 0.098 * (i / 11) as f32);
-            if let Some((w, _)) = window.direction(p) {
-                let found = window.find(w).expect("inside");
-                assert!((found - p).length() < 1e-4, "{p} {found}");
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_find_their_own_directions() {
+        let axis = Vec3::new(0.6, 0.0, 0.8);
+        for window in [Window::Side(1.0), Window::Side(-1.0), Window::around(axis, 0.4), Window::Facets(axis, 0.5)] {
+            for i in 0..100 {
+                let p = Vec2::new(0.01 + 0.098 * (i % 11) as f32, 0.01 + 0.098 * (i / 11) as f32);
+                if let Some((w, _)) = window.direction(p) {
+                    let found = window.find(w).expect("inside");
+                    assert!((found - p).length() < 1e-4, "{p} {found}");
+                }
             }
         }
+        let whole: f64 = Window::Side(1.0).integrate(|w| f64::from(w.z)).iter().sum();
+        assert!((whole - std::f64::consts::PI).abs() < 1e-3);
     }
-    let whole: f64 = Window::Side(1.0).integrate(|w| f64::from(w.z)).iter().sum();
-    assert!((whole - std::f64::consts::PI).abs() < 1e-3);
-}
 
-#[test]
-fn a_wrong_density_is_found() {
-    let window = Window::Side(1.0);
-    let mut random = nephroid::math::Random::new(nephroid::math::random::Family::Other, 1, 0, 0);
-    let counts = window.count((0..100_000).map(|_| Some(nephroid::math::warp::hemisphere_cosine(random.unit2()))));
-    let right = window.integrate(|w| f64::from(w.z.max(0.0) / PI));
-    let wrong = window.integrate(|w| f64::from(if w.z > 0.0 { 0.03 + 0.94 * w.z / PI } else { 0.0 }));
-    assert!(p_value(&right, &counts) > 1e-4);
-    assert!(p_value(&wrong, &counts) < 1e-12);
+    #[test]
+    fn a_wrong_density_is_found() {
+        let window = Window::Side(1.0);
+        let mut random = crate::math::Random::new(crate::math::random::Family::Other, 1, 0, 0);
+        let counts = window.count((0..100_000).map(|_| Some(crate::math::warp::hemisphere_cosine(random.unit2()))));
+        let right = window.integrate(|w| f64::from(w.z.max(0.0) / PI));
+        let wrong = window.integrate(|w| f64::from(if w.z > 0.0 { 0.03 + 0.94 * w.z / PI } else { 0.0 }));
+        assert!(p_value(&right, &counts) > 1e-4);
+        assert!(p_value(&wrong, &counts) < 1e-12);
+    }
 }

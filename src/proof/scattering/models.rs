@@ -1,11 +1,11 @@
-//! The list of models under test.
+//! Local models under test: every kind, with parameters from smooth to rough, alone and combined.
 
-use glam::{Mat4, Vec2, Vec3};
-use nephroid::describe::{
+use crate::describe::{
     BitmapFilter, BitmapWrap, BsdfDescription, BsdfId, BsdfModel, Image, ImageDescription, ImageId, MicrofacetDescription, Place,
     TextureDescription,
 };
-use nephroid::local::{Closure, MaterialId, Materials};
+use crate::local::{Closure, MaterialId, Materials};
+use glam::{Mat4, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Texture coordinates of all tests.
@@ -28,15 +28,18 @@ impl Case {
         self.materials.resolve(self.id(), UV, w_back.z > 0.0)
     }
 
+    /// Its materials.
     pub fn materials(&self) -> &Materials {
         &self.materials
     }
 
+    /// Which of them it is.
     pub fn id(&self) -> MaterialId {
         MaterialId(self.materials.len() as u32 - 2)
     }
 }
 
+/// A grey constant.
 pub fn grey(v: f32) -> TextureDescription {
     TextureDescription::grey(v)
 }
@@ -70,6 +73,7 @@ pub fn images() -> Vec<ImageDescription> {
     vec![ImageDescription::Data(Arc::new(Image { width: 2, height: 2, channels: 3, data }))]
 }
 
+/// A model as described in no file.
 pub fn described(model: BsdfModel) -> BsdfDescription {
     BsdfDescription { id: None, model, place: Place::default() }
 }
