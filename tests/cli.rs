@@ -441,13 +441,15 @@ fn local_and_recursive_say_what_they_leave_out() {
     let (image, rest) = (room.path("a.exr"), room.path("rest.exr"));
     for estimator in ["local", "local-unshadowed", "recursive"] {
         let mut command = nephroid();
-        command.arg("render").arg(room.scene()).args(["--estimator", estimator, "-o"]).arg(&image);
+        command.arg("render").arg(room.scene()).args(["--estimator", estimator, "--layers", "-o"]).arg(&image);
         let (code, _, err) = run(command.arg("--left-out").arg(&rest));
         assert_eq!(code, 0, "{err}");
         let (part, rest) = (read_image(&image).expect("an image"), read_image(&rest).expect("the rest"));
         let mean = |f: &ImageFile| f.rgb("").expect("colours").iter().map(|p| p[0]).sum::<f32>();
         assert!(mean(&rest) > 0.0 && mean(&rest) < mean(&part), "{estimator}: light bounces between floor and lamp");
         assert!(rest.rgb("variance").is_some());
+        // A lamp and what it lights: there are no mirrors beyond.
+        assert_eq!((part.rgb("n1").is_some(), part.rgb("n2").is_some()), (true, estimator == "recursive"));
     }
     for wrong in [
         vec!["--left-out", "r.exr"],

@@ -61,11 +61,11 @@ pub fn partitions(args: &LayersArgs, settings: &Settings, scene: &Scene) -> Resu
     let mut partitions = Vec::new();
     if args.layers.is_some() || args.gallery.is_some() {
         let last = args.layers.flatten().unwrap_or(LAST_TERM);
-        let longest = settings.max_length.max(1) - 1;
+        let longest = settings.longest().max(1) - 1;
         partitions.push(Partition::Scatterings { last: last.min(longest), rest: longest > last });
     }
     if args.pyramid.is_some() {
-        partitions.push(Partition::Joins(Joins::new(settings.techniques, args.pyramid_length, settings.max_length)));
+        partitions.push(Partition::Joins(Joins::new(settings.techniques, args.pyramid_length, settings.longest())));
     }
     if let Some(groups) = &args.light_groups {
         let emitters = scene.lights.infos();

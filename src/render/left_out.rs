@@ -17,7 +17,7 @@ pub fn left_out(
     mut progress: impl FnMut(&Progress) -> Control + Send,
 ) -> Result<Picture, RenderError> {
     let longest = scene.integrator.max_depth.unwrap_or(u32::MAX);
-    let followed = options.settings.max_length;
+    let followed = options.settings.longest();
     let full = Settings {
         techniques: Techniques::BIDIRECTIONAL,
         coupling: Coupling::All,
@@ -28,7 +28,7 @@ pub fn left_out(
     let beyond = |n: u32| Settings { min_length: n.saturating_add(1).max(full.min_length), ..full.clone() };
     match options.settings.coupling {
         Coupling::All => {}
-        Coupling::None { .. } => parts.push(beyond(followed.min(2))),
+        Coupling::None { .. } => parts.push(beyond(followed)),
         Coupling::Specular => {
             parts.push(Settings { paths: class("E S* D .+ L"), ..full.clone() });
             parts.push(Settings { paths: class("E S* D? L"), ..beyond(followed) });

@@ -118,6 +118,16 @@ pub struct Settings {
     pub seed: u64,
 }
 
+impl Settings {
+    /// Longest path in edges that is walked.
+    pub fn longest(&self) -> u32 {
+        self.max_length.min(match self.coupling {
+            Coupling::All | Coupling::Specular => LONGEST_PATH,
+            Coupling::None { .. } => 2,
+        })
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -185,10 +195,7 @@ impl Plan {
         let n = if t.splat { light_paths as f32 } else { 0.0 };
         let normaliser = if planted(Mutant::SplatCropNormalisation) { film_pixels } else { light_paths };
         let mut settings = settings.clone();
-        settings.max_length = settings.max_length.min(match settings.coupling {
-            Coupling::All | Coupling::Specular => LONGEST_PATH,
-            Coupling::None { .. } => 2,
-        });
+        settings.max_length = settings.longest();
         Self {
             light_paths,
             n,
