@@ -243,7 +243,8 @@ fn constant_reflected_radiance() -> Rows {
             rows.push(Row::mean("A17", what, film_mean(&world, &o, 64)?, exact));
         }
     }
-    for estimator in ESTIMATORS {
+    // A pixel has too few splats for its mean to be normal.
+    for estimator in [Estimator::Gather, Estimator::Bidirectional] {
         let exact = SPHERE_ALBEDO * SPHERE_EMISSION;
         rows.push(constant("A17", "sphere with lamps, n = 1".into(), &world, estimator, (2, 2), exact)?);
     }
