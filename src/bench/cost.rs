@@ -4,8 +4,8 @@
 
 use super::contender::{Contender, Stop, Walker};
 use super::effort::{Effort, Mark, Marks};
-use super::figures::Measure;
 use super::race::{figures, run_seed};
+use super::ratios::Measure;
 use super::reference::Reference;
 use super::statistics::{Interval, mean};
 use crate::render::Estimator;

@@ -9,13 +9,17 @@ use super::cost::Cost;
 use super::effort::{Effort, Mark};
 use super::layers::Layers;
 use super::race::Entry;
+use super::ratios::{Measure, Ratio, ratios};
 use super::reference::Reference;
-use super::statistics::{Interval, geometric_mean, mean, ratio};
+use super::statistics::{Interval, geometric_mean, mean};
 use super::{Subject, size, verdict};
 use crate::report::coverage::{Blind, Coverage};
 use crate::report::measures::Noise;
 use crate::transport::RayCounts;
 use serde::Serialize;
+
+/// A first pass may end so much later than a mark and still count for it.
+const OVERSHOOT: f64 = 1.2;
 
 /// Everything.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -162,27 +166,6 @@ pub struct Point {
     pub noise: Noise,
 }
 
-/// What is compared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Measure {
-    /// Relative mean squared error.
-    Relmse,
-    /// The same without the worst 0.1 % of pixels.
-    RelmseTrimmed,
-    /// Root mean squared error.
-    Rmse,
-    /// Mean LDR-FLIP error.
-    Flip,
-    /// Variance times seconds, the inverse of the efficiency; at the end only.
-    Cost,
-}
-
-impl Measure {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Relmse, Self::RelmseTrimmed, Self::Rmse, Self::Flip, Self::Cost];
-}
-
 impl Point {
     /// An error without what the reference added; `None` where it is mostly that.
     pub fn own(&self, error: f64, noise: f64) -> Option<f64> {
@@ -223,18 +206,21 @@ impl RunFigures {
     }
 
     /// At a mark: between the checkpoints on both sides of it as if errors were powers of the time, since a
-    /// run goes on to the end of a pass; the last one where the run is shorter.
-    fn at(&self, mark: Mark) -> Option<Point> {
+    /// run goes on to the end of a pass; the last one where the run is shorter; none where the first pass ended
+    /// long after the mark.
+    pub fn at(&self, mark: Mark) -> Option<Point> {
         let place = |p: &Point| mark.of(p.seconds, p.samples);
         let Some(next) = self.curve.iter().position(|p| place(p) >= mark.amount()) else { return self.curve.last().copied() };
         let after = self.curve[next];
-        let Some(before) = next.checked_sub(1).map(|i| self.curve[i]) else { return Some(after) };
+        let Some(before) = next.checked_sub(1).map(|i| self.curve[i]) else {
+            return Some(after).filter(|p| place(p) <= OVERSHOOT * mark.amount());
+        };
         let share = (mark.amount() / place(&before)).ln() / (place(&after) / place(&before)).ln();
         Some(before.towards(&after, share))
     }
 
     /// By a measure at a mark.
-    fn error(&self, measure: Measure, mark: Mark) -> Option<f64> {
+    pub fn error(&self, measure: Measure, mark: Mark) -> Option<f64> {
         match measure {
             Measure::Cost => self.variance.map(|v| v * self.seconds),
             _ => self.at(mark)?.error(measure),
@@ -280,25 +266,6 @@ pub struct Errors {
     pub flip: Option<Interval>,
     /// The relMSE of some run is less than twice what the reference adds to it.
     pub below_reference: bool,
-}
-
-/// Error of `a` over error of `b`.
-#[derive(Clone, Debug, Serialize)]
-pub struct Ratio {
-    /// Number of a contender.
-    pub a: usize,
-    /// Number of another.
-    pub b: usize,
-    /// Of what.
-    pub measure: Measure,
-    /// At which mark.
-    pub mark: String,
-    /// With its interval: none without more than one run of both, or where an error is below the noise of the reference.
-    pub ratio: Option<Interval>,
-    /// The interval leaves out 1.
-    pub significant: bool,
-    /// Why there is no ratio.
-    pub why_not: Option<&'static str>,
 }
 
 impl Report {
@@ -383,33 +350,6 @@ fn errors(runs: &[RunFigures], mark: Mark) -> Errors {
     }
 }
 
-/// All pairs (a, b) with a ≠ b.
-fn ratios(contenders: &[ContenderFigures], marks: &[Mark]) -> Vec<Ratio> {
-    let n = contenders.len();
-    let pairs = (0..n).flat_map(|a| (0..n).filter(move |b| *b != a).map(move |b| (a, b)));
-    let with_marks = pairs.flat_map(|p| marks.iter().map(move |m| (p, *m)));
-    let all = with_marks.flat_map(|(p, m)| Measure::ALL.map(|measure| (p, m, measure)));
-    all.map(|((a, b), mark, measure)| pair(contenders, (a, b), mark, measure)).collect()
-}
-
-fn pair(contenders: &[ContenderFigures], (a, b): (usize, usize), mark: Mark, measure: Measure) -> Ratio {
-    // Runs are pairs only where both have them.
-    let runs = contenders[a].runs.len().min(contenders[b].runs.len());
-    let errors = |i: usize| contenders[i].runs[..runs].iter().map(|r| r.error(measure, mark)).collect::<Option<Vec<f64>>>();
-    let both = errors(a).zip(errors(b));
-    let found = both.as_ref().and_then(|(a, b)| ratio(a, b));
-    let why_not = match (runs, &both, &found) {
-        (_, _, Some(_)) => None,
-        (0, ..) => Some("no run"),
-        (1, ..) => Some("one run: no interval, no ratio"),
-        (_, None, _) if measure == Measure::Cost => Some("the variance is not known"),
-        (_, None, _) => Some("below the noise of the reference"),
-        _ => Some("no error on one side"),
-    };
-    let significant = found.is_some_and(|r| r.excludes(1.0));
-    Ratio { a, b, measure, mark: mark.text(), ratio: found, significant, why_not }
-}
-
 /// Relative standard error of the light of the whole reference; 0 where its variance is not known.
 fn energy_uncertainty(reference: &Reference) -> f64 {
     let p = &reference.picture;
@@ -428,4 +368,41 @@ fn energy_uncertainty(reference: &Reference) -> f64 {
     }
     let sum: f64 = p.mean.iter().flatten().filter(|v| v.is_finite()).map(|v| f64::from(*v)).sum();
     if sum > 0.0 { variance.sqrt() / sum } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn errors_at_a_mark_lie_between_checkpoints() {
+        let point = |seconds: f64, relmse: f64| Point {
+            seconds,
+            samples: seconds as u64,
+            rmse: relmse.sqrt(),
+            relmse,
+            relmse_trimmed: relmse,
+            flip: relmse,
+            noise: Noise::default(),
+        };
+        let run = |curve| RunFigures {
+            seed: 0,
+            seconds: 8.0,
+            samples: 8,
+            rays: None,
+            memory: None,
+            variance: None,
+            slope: None,
+            energy: 1.0,
+            curve,
+        };
+        let at = |curve: &[Point], seconds| run(curve.to_vec()).at(Mark::Time(Duration::from_secs(seconds))).map(|p| p.relmse);
+        let curve = [point(2.0, 0.4), point(8.0, 0.1)];
+        assert!((at(&curve, 4).unwrap() - 0.2).abs() < 1e-12);
+        assert_eq!((at(&curve, 8), at(&curve, 20)), (Some(0.1), Some(0.1)));
+        // A pass of 12 seconds says nothing of the fourth, one of 4.2 nearly all.
+        assert_eq!(at(&[point(12.0, 0.1)], 4), None);
+        assert_eq!(at(&[point(4.2, 0.3)], 4), Some(0.3));
+    }
 }

@@ -9,7 +9,7 @@
 //! - [`reference`](mod@reference): what errors are taken from, given or made once and kept beside the scene.
 //! - [`race`]: the runs of one scene.
 //! - [`statistics`]: means, ratios and slopes with intervals.
-//! - [`figures`]: what the runs say.
+//! - [`figures`]: what the runs say; [`ratios`]: of pairs.
 //! - [`layers`]: who carries which light and which noise.
 //! - [`cost`]: what following more of the coupling costs.
 //! - [`verdict`]: all that in words.
@@ -23,6 +23,7 @@ pub mod layers;
 pub mod page;
 pub mod peers;
 pub mod race;
+pub mod ratios;
 pub mod reference;
 pub mod statistics;
 pub mod table;

@@ -1,7 +1,8 @@
 //! The figures of a scene in words: who is nearest, what combining buys, what is missing, what nobody sees.
 
-use super::figures::{ContenderFigures, Measure, Ratio, SceneReport};
+use super::figures::{ContenderFigures, SceneReport};
 use super::layers::CLASSES;
+use super::ratios::{Measure, Ratio};
 use super::statistics::{Interval, quotient};
 use crate::render::Estimator;
 

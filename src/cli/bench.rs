@@ -12,7 +12,7 @@ use crate::bench::reference::reference;
 use crate::bench::{Effort, Marks, Report, SceneReport, Subject, size, table};
 use crate::io::fault::{Fault, reason};
 use crate::io::write::write_atomic;
-use crate::render::Estimator;
+use crate::render::{Estimator, Options};
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -177,13 +177,18 @@ impl Bench<'_> {
 
     /// All that take part, in the order of the command line.
     fn contenders<'s>(&self, subject: &Subject<'s>) -> Vec<Box<dyn Contender + 's>> {
-        let walker = |e: &Estimator| Box::new(Walker::new(subject.scene, *e)) as Box<dyn Contender + 's>;
+        let walker = |(i, e): (usize, &Estimator)| {
+            let twin = self.estimators[..i].iter().filter(|o| *o == e).count();
+            let name = if twin == 0 { e.name().to_owned() } else { format!("{} ({})", e.name(), twin + 1) };
+            let options = Options::for_scene(subject.scene, *e);
+            Box::new(Walker::with(name, subject.scene, options)) as Box<dyn Contender + 's>
+        };
         let job = Job { subject, define: &self.args.define, threads: rayon::current_num_threads() };
         let peer = |p: &Peer| match p.start(&job) {
             Ok(process) => Box::new(process) as Box<dyn Contender + 's>,
             Err(reason) => Box::new(Absent { name: p.name(), reason }),
         };
-        self.estimators.iter().map(walker).chain(self.peers.iter().map(peer)).collect()
+        self.estimators.iter().enumerate().map(walker).chain(self.peers.iter().map(peer)).collect()
     }
 
     /// Page, JSON and CSV of what there is.

@@ -1,8 +1,9 @@
 //! The figures are right: known variance, slope −1, and intervals that are wrong as often as they say.
 
 use nephroid::bench::contender::{Contender, Walker};
-use nephroid::bench::figures::{Measure, SceneReport};
+use nephroid::bench::figures::SceneReport;
 use nephroid::bench::race::race;
+use nephroid::bench::ratios::{Measure, Ratio};
 use nephroid::bench::reference::Reference;
 use nephroid::bench::{Effort, Marks, Subject};
 use nephroid::render::{Budget, Control, Estimator, Options, Render};
@@ -89,7 +90,7 @@ fn identical_configurations_are_told_apart_as_rarely_as_they_should() {
     let reference = exact(Picture::of_film(render.film()));
     let same = (0..200).filter(|i| {
         let report = report(&scene, &reference, &effort(4, 3, 1000 + i), &[Estimator::Gather; 2]);
-        let of_first = |r: &&nephroid::bench::figures::Ratio| r.a == 0 && r.measure == Measure::RelmseTrimmed;
+        let of_first = |r: &&Ratio| r.a == 0 && r.measure == Measure::RelmseTrimmed;
         let ratio = report.ratios.iter().find(of_first).unwrap();
         assert!(ratio.ratio.unwrap().bounds.is_some());
         !ratio.significant
