@@ -41,6 +41,8 @@ const MERGED_PIXELS: f32 = 2.0;
 const CHOICE: u32 = 3;
 /// Light paths that judge techniques, at most.
 const JUDGES: u32 = 8192;
+/// Cells on each side of one that are taken together with it.
+const BLUR: u32 = 2;
 /// Cells of the coarse image along its longer side, at most.
 const CELLS: u32 = 64;
 
@@ -327,12 +329,19 @@ impl<'a> Pilot<'a> {
     }
 
     /// Square of the coarse image per pixel, and a little more, so that black parts do not outweigh all.
+    /// A cell has seen few walks, so it is taken together with those around it: where it was missed by
+    /// chance, the first contribution would seem enormous.
     fn squares(&self) -> Vec<f64> {
-        let cells = self.image.iter().enumerate();
-        let mut squares: Vec<f64> = cells.map(|(i, sum)| (sum / (self.weight * self.cell_pixels(i as u32))).powi(2)).collect();
+        let [columns, rows] = self.cells;
+        let around = |at: u32, size: u32| at.saturating_sub(BLUR)..(at + BLUR + 1).min(size);
+        let radiance = |(x, y): (u32, u32)| {
+            let cells = around(y, rows).flat_map(|y| around(x, columns).map(move |x| y * columns + x));
+            let (sum, pixels) = cells.fold((0.0, 0.0), |(s, p), c| (s + self.image[c as usize], p + self.cell_pixels(c)));
+            sum / (self.weight * pixels)
+        };
         let mean = self.image.iter().sum::<f64>() / (self.weight * f64::from(self.crop[2]) * f64::from(self.crop[3]));
-        squares.iter_mut().for_each(|s| *s += 0.01 * mean * mean);
-        squares
+        let all = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+        all.map(|at| radiance(at).powi(2) + 0.01 * mean * mean).collect()
     }
 
     /// √Σ (v/I)² of each light path over its contributions.
