@@ -497,3 +497,35 @@ fn the_longest_path_is_chosen_and_explained() {
         assert_eq!(code, 2, "{err}");
     }
 }
+
+#[test]
+fn a_plan_is_written_once_and_read_from_then_on() {
+    let room = Room::new();
+    let plan = room.path("plan.json");
+    let render = |image: &str, more: &[&str]| {
+        let mut command = nephroid();
+        command.arg("render").arg(room.scene()).args(more).arg("--plan").arg(&plan);
+        run(command.arg("-o").arg(room.path(image)))
+    };
+    let (code, _, err) = render("a.exr", &[]);
+    assert!(code == 0 && err.contains("chosen in"), "{err}");
+    let written = std::fs::read_to_string(&plan).expect("a plan");
+    let image = |name: &str| read_image(&room.path(name)).expect("an image");
+    assert_eq!(image("a.exr").attributes.get("plan").map(String::as_str), Some(written.trim()));
+    std::fs::write(&plan, r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": 0}"#).expect("written");
+    let (code, _, err) = render("b.exr", &[]);
+    assert!(code == 0 && !err.contains("chosen in"), "{err}");
+    assert_eq!(image("b.exr").attributes.get("techniques").map(String::as_str), Some("hit"));
+    for (text, what) in [
+        (r#"{"techniques": "hit, leap", "light_paths": 0, "connections": 1, "merge_radius": 0}"#, "unknown technique `leap`"),
+        (r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": -1}"#, "merge_radius"),
+        (r#"{"techniques": "hit", "light_paths": 0}"#, "missing field"),
+        (r#"{"techniques": "splat", "light_paths": 4294967295, "connections": 1, "merge_radius": 0}"#, "--max-memory"),
+        ("", "EOF"),
+    ] {
+        std::fs::write(&plan, text).expect("written");
+        let (code, _, err) = render("c.exr", &[]);
+        assert!(code == 2 && err.contains(what) && !room.path("c.exr").exists(), "{text}: {err}");
+    }
+    assert_eq!(render("c.exr", &["-e", "gather"]).0, 2);
+}

@@ -314,6 +314,9 @@ pub struct TransportArgs {
     /// Connections from each gathering vertex.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub connections: u32,
+    /// What the pilot of --estimator auto chose: read where FILE exists, else written to it.
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub plan: Option<PathBuf>,
     /// Let light start as the lamps emit it, not where a pilot found that it matters
     #[arg(long)]
     pub no_guide: bool,

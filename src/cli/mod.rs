@@ -20,6 +20,7 @@ pub mod interrupt;
 pub mod layers;
 pub mod open;
 pub mod output;
+pub mod plan;
 pub mod progress;
 pub mod proof;
 pub mod render;

@@ -5,7 +5,7 @@ use super::open::{self, Described, Opened};
 use super::output::{self, Outputs};
 use super::progress::ProgressLine;
 use super::units::{show_count, show_duration};
-use super::{Exit, Failure, elements, interrupt, layers, tell};
+use super::{Exit, Failure, elements, interrupt, layers, plan, tell};
 use crate::io::exr::ImageFile;
 use crate::io::fault::{Fault, reason};
 use crate::io::png::PngOptions;
@@ -47,6 +47,15 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
         tell(&opened.problems.render(&opened.description.sources));
     }
     let (estimator, mut options) = options(&opened, args);
+    let mut new_plan = None;
+    if let Some(path) = &args.transport.plan {
+        if estimator != Estimator::Auto {
+            return Err(Failure::usage("--plan belongs to --estimator auto"));
+        }
+        if !plan::read(path, &mut options.settings)? {
+            new_plan = Some(path.as_path());
+        }
+    }
     let all = options.settings.coupling == Coupling::All;
     if args.transport.techniques.is_some() && !all {
         return Err(Failure::usage(format!("--estimator {} has no --techniques to choose from", estimator.name())));
@@ -71,10 +80,11 @@ pub fn run(args: &RenderArgs, command: &[OsString]) -> Result<Exit, Failure> {
     options.layers = layers::partitions(&args.layers, &options.settings, &opened.scene)?;
     let film = &opened.scene.film;
     let [_, _, width, height] = film.crop.unwrap_or([0, 0, film.width, film.height]);
-    let whole = output::memory_needed(width, height, args.transport.light_paths, options.settings.techniques.shoots());
+    let whole = output::memory_needed(width, height, options.settings.light_paths, options.settings.techniques.shoots());
+    output::check_memory(whole, args.max_memory, [width, height])?;
     layers::check_memory(&options.layers, whole, [width, height], args.max_memory)?;
     let budget = budget(&opened.scene, args);
-    let mut job = Job { args, command, outputs, estimator, options, truncation, budget, start };
+    let mut job = Job { args, command, outputs, estimator, options, truncation, new_plan, budget, start };
     if !args.quiet {
         tell(&job.announcement());
     }
@@ -216,6 +226,8 @@ struct Job<'a> {
     estimator: Estimator,
     options: Options,
     truncation: Option<Truncation>,
+    /// Where to write what the pilot chose.
+    new_plan: Option<&'a Path>,
     budget: Budget,
     start: Instant,
 }
@@ -242,6 +254,9 @@ impl Job<'_> {
         let mut render = Render::new(scene, &self.options).map_err(|e| Failure::usage(e.to_string()))?;
         if self.options.settings.automatic && !self.args.quiet {
             tell(&self.choice(render.plan(), began.elapsed()));
+        }
+        if let Some(path) = self.new_plan {
+            plan::write(path, render.plan()).map_err(|f| Failure { exit: Exit::Output, message: format!("error: {f}\n") })?;
         }
         let pixels = u64::from(render.film().width()) * u64::from(render.film().height());
         let line = ProgressLine::new(self.args.quiet, self.budget.passes, self.budget.time, pixels);
@@ -340,6 +355,7 @@ impl Job<'_> {
             ("sceneHash", scene.hash_hex()),
             ("estimator", self.estimator.name().to_owned()),
             ("techniques", render.plan().settings.techniques.names()),
+            ("plan", plan::text(render.plan())),
             ("seed", set.seed.to_string()),
             ("samples", s.passes.to_string()),
             ("renderTime", format!("{:.3}", s.time.as_secs_f64())),

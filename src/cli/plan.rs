@@ -1,0 +1,72 @@
+//! `--plan FILE`: what a pilot chose, to be looked at, changed, and used for other images of a series.
+
+use super::Failure;
+use crate::io::fault::{Fault, reason};
+use crate::io::write::write_atomic;
+use crate::transport::settings::{Plan, Settings, Techniques};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A longer file is no plan.
+const MOST_BYTES: u64 = 65_536;
+
+/// Joins and numbers of walks, as they stand in the file.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlanFile {
+    /// Such as `hit, nee, splat`.
+    techniques: String,
+    /// Per pass; 0 where nothing shoots.
+    light_paths: u32,
+    /// From each gathering vertex.
+    connections: u32,
+    /// In the first pass; 0 where nothing merges.
+    merge_radius: f32,
+}
+
+/// As text, for files and for images' attributes.
+pub fn text(plan: &Plan) -> String {
+    let s = &plan.settings;
+    let file = PlanFile {
+        techniques: s.techniques.names(),
+        light_paths: plan.light_paths,
+        connections: s.connections,
+        merge_radius: plan.merge_radius,
+    };
+    serde_json::to_string(&file).unwrap_or_default()
+}
+
+/// Takes the plan of an existing file into `settings`; whether there was one.
+pub fn read(path: &Path, settings: &mut Settings) -> Result<bool, Failure> {
+    let wrong = |what: String| Failure::usage(format!("--plan {}: {what}", path.display()));
+    let size = match std::fs::metadata(path) {
+        Ok(m) => m.len(),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
+        Err(e) => return Err(wrong(reason(&e))),
+    };
+    if size > MOST_BYTES {
+        return Err(wrong(format!("a plan is a few lines of JSON, not {size} bytes")));
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(reason(&e)))?;
+    let file: PlanFile = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let known = Techniques::NAMES.join(", ");
+    let techniques = Techniques::parse(&file.techniques)
+        .map_err(|name| wrong(format!("unknown technique `{name}` (known: {known})")))?;
+    if !(file.merge_radius >= 0.0 && file.merge_radius.is_finite()) {
+        return Err(wrong(format!("merge_radius is {}, expected a length of at least 0", file.merge_radius)));
+    }
+    settings.techniques = techniques;
+    settings.light_paths = (file.light_paths > 0).then_some(file.light_paths);
+    settings.connections = file.connections;
+    settings.merge_radius = Some(file.merge_radius);
+    settings.automatic = false;
+    Ok(true)
+}
+
+/// Writes the plan to a new file.
+pub fn write(path: &Path, plan: &Plan) -> Result<(), Fault> {
+    write_atomic(path, |out| {
+        use std::io::Write;
+        writeln!(out, "{}", text(plan)).map_err(|e| Fault::new(reason(&e)))
+    })
+}

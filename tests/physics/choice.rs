@@ -1,0 +1,111 @@
+//! What a pilot chooses: joins that find nothing go, what only one join finds keeps it, and the choice
+//! changes no expectation.
+
+use crate::scenes;
+use crate::support::{BLOCK, scene, seed};
+use nephroid::render::{Budget, Control, Estimator, Options, Render};
+use nephroid::report::agreement::{BlockSeries, agreement};
+use nephroid::scene::Scene;
+use nephroid::transport::settings::{Plan, Settings, Techniques};
+
+fn automatic(world: &Scene, seed: u64) -> Options {
+    let mut options = Options::for_scene(world, Estimator::Auto);
+    options.settings = Settings { seed, max_length: 6, ..options.settings };
+    options
+}
+
+fn chosen(xml: &str) -> Plan {
+    let world = scene(xml);
+    Render::new(&world, &automatic(&world, seed())).unwrap().plan().clone()
+}
+
+fn room(things: &str) -> String {
+    format!(
+        r#"<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="60"/>
+  <transform name="to_world"><lookat origin="0, 1, 1.9" target="0, 0.6, 0" up="0, 1, 0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="64"/><rfilter type="box"/></film></sensor>
+<shape type="cube"><boolean name="flip_normals" value="true"/><transform name="to_world"><scale x="2" y="1" z="2"/><translate y="1"/></transform>
+  <bsdf type="diffuse"><rgb name="reflectance" value="0.6"/></bsdf></shape>{things}</scene>"#
+    )
+}
+
+const BULB: &str = r#"<shape type="sphere"><point name="center" value="0, 0.6, 0"/><float name="radius" value="0.05"/>
+  <emitter type="area"><rgb name="radiance" value="50"/></emitter></shape>"#;
+
+/// A shell of glass around the bulb.
+const SHELL: &str = r#"<shape type="sphere"><point name="center" value="0, 0.6, 0"/><float name="radius" value="0.3"/>
+  <bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf></shape>"#;
+
+#[test]
+fn shadow_rays_end_where_glass_is_around_every_light() {
+    assert!(chosen(&room(BULB)).settings.techniques.next_event);
+    let plan = chosen(&room(&format!("{BULB}{SHELL}")));
+    assert!(!plan.settings.techniques.next_event && plan.settings.techniques.splat, "{:?}", plan.settings.techniques);
+}
+
+#[test]
+fn matt_rooms_are_gathered() {
+    let dir = tempfile::tempdir().unwrap();
+    let plan = chosen(&scenes::named(dir.path(), "diffuse box"));
+    let t = plan.settings.techniques;
+    assert!(t.next_event && !t.merge && plan.light_paths <= 48 * 48, "{t:?}, {} light paths", plan.light_paths);
+}
+
+#[test]
+fn merges_stay_where_nothing_else_sees() {
+    let dir = tempfile::tempdir().unwrap();
+    let wet = chosen(&room(
+        r#"<emitter type="point"><point name="position" value="0.3, 1.8, 0.2"/><rgb name="intensity" value="3"/></emitter>
+<shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/><translate y="0.3"/></transform>
+  <bsdf type="dielectric"><float name="int_ior" value="1.33"/><float name="ext_ior" value="1"/></bsdf></shape>"#,
+    ));
+    assert!(wet.settings.techniques.merge && wet.merge_radius > 0.0);
+    let dry = chosen(&scenes::named(dir.path(), "diffuse box"));
+    assert!(!dry.settings.techniques.merge);
+}
+
+/// Block means of independent renders.
+fn blocks(world: &Scene, renders: u64, options: impl Fn(u64) -> Options) -> BlockSeries {
+    let (columns, rows) = ((world.film.width / BLOCK) as usize, (world.film.height / BLOCK) as usize);
+    let draw = |r: u64| {
+        let mut render = Render::new(world, &options(r)).unwrap();
+        render.run(&Budget::passes(4), |_| Control::Continue);
+        let picture = render.picture();
+        let mut sums = vec![0.0; columns * rows];
+        for (i, p) in picture.mean.iter().enumerate() {
+            let (x, y) = (i as u32 % picture.width, i as u32 / picture.width);
+            sums[(y / BLOCK) as usize * columns + (x / BLOCK) as usize] += f64::from(p[0] + p[1] + p[2]);
+        }
+        sums
+    };
+    BlockSeries { columns, rows, draws: (0..renders).map(draw).collect(), largest: 0.0 }
+}
+
+/// Each render has its own pilot, choice and guide; merges, which are biased, are not among the joins.
+#[test]
+fn whatever_is_chosen_the_mean_is_that_of_all_joins() {
+    let dir = tempfile::tempdir().unwrap();
+    for (i, name) in ["diffuse box", "glass and mirror", "sun disk"].into_iter().enumerate() {
+        let world = scene(&scenes::named(dir.path(), name));
+        let first = seed() * 100_000 + 1000 * i as u64;
+        let chosen = blocks(&world, 40, |r| {
+            let mut options = automatic(&world, first + r);
+            options.settings.techniques = Techniques::BIDIRECTIONAL;
+            options
+        });
+        let all = blocks(&world, 40, |r| {
+            let mut options = automatic(&world, first + 500 + r);
+            options.settings = Settings {
+                techniques: Techniques::BIDIRECTIONAL,
+                automatic: false,
+                guided: false,
+                stratified: false,
+                ..options.settings
+            };
+            options
+        });
+        let v = agreement(&chosen, &all);
+        println!("{name}: totals {:?}, p = {:.2e}, {:.0} % tested", v.totals, v.p, 100.0 * v.energy_tested);
+        assert!(v.p > 1e-4 / 3.0 && v.energy_tested > 0.6, "{name}: {:?}, p = {:.1e}", v.totals, v.p);
+    }
+}
