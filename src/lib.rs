@@ -18,7 +18,7 @@
 //! - [`io`]: one file per format.
 //! - [`report`]: comparison of images.
 //! - [`proof`]: statements of the theory, tested on a scene.
-//! - [`bench`]: estimators side by side in equal time, as a page.
+//! - [`mod@bench`]: estimators side by side in equal time, as a page.
 //! - [`cli`]: the command line.
 //!
 //! ```no_run

@@ -8,7 +8,7 @@
 //! - [`render`], [`output`], [`progress`], [`interrupt`]: rendering.
 //! - [`layers`]: what is written beside the image.
 //! - [`elements`]: rendering by finite elements.
-//! - [`bench`]: estimators side by side, as a page.
+//! - [`mod@bench`]: estimators side by side, as a page.
 //! - [`info`], [`compare`], [`proof`]: the other subcommands.
 
 pub mod args;

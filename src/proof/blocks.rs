@@ -51,7 +51,7 @@ pub struct Series<'a> {
 pub enum Kind {
     /// Into all directions.
     Wide,
-    /// Into few: all lobes rougher than Dirac, one of them less rough than [`NARROW`].
+    /// Into few: all lobes rougher than Dirac, one of them less rough than `NARROW`.
     Narrow,
     /// A Dirac event.
     Dirac,

@@ -12,7 +12,7 @@
 //!
 //! At each vertex every light is asked, not one at random, so that points, spots and parallel light bring no
 //! noise, and both Dirac events are followed, not one at random. Branching doubles the work, so after
-//! [`BRANCHING`] events one of them is chosen; that keeps the expectation and bounds memory.
+//! `BRANCHING` events one of them is chosen; that keeps the expectation and bounds memory.
 
 use super::class::{Finished, Positions, Symbol};
 use super::vertex::Vertex;

@@ -2,7 +2,7 @@
 //!
 //! A peer is a program that speaks lines of JSON ([`process`]): it is told a scene once and a run at a time,
 //! and answers with an image at every mark. A new one is a script, a file like [`mitsuba`] that starts it, and
-//! a line in [`PEERS`].
+//! a line in `PEERS`.
 
 pub mod mitsuba;
 pub mod process;
