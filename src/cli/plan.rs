@@ -50,8 +50,8 @@ pub fn read(path: &Path, settings: &mut Settings) -> Result<bool, Failure> {
     let text = std::fs::read_to_string(path).map_err(|e| wrong(reason(&e)))?;
     let file: PlanFile = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
     let known = Techniques::NAMES.join(", ");
-    let techniques = Techniques::parse(&file.techniques)
-        .map_err(|name| wrong(format!("unknown technique `{name}` (known: {known})")))?;
+    let techniques =
+        Techniques::parse(&file.techniques).map_err(|name| wrong(format!("unknown technique `{name}` (known: {known})")))?;
     if !(file.merge_radius >= 0.0 && file.merge_radius.is_finite()) {
         return Err(wrong(format!("merge_radius is {}, expected a length of at least 0", file.merge_radius)));
     }
