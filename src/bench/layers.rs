@@ -14,8 +14,7 @@ use super::reference::Reference;
 use crate::film::layout::TILE_PIXELS;
 use crate::film::{Filter, Layout};
 use crate::math::Random;
-use crate::math::random::Family;
-use crate::render::{Budget, Options, Render, SHOOT_JOB};
+use crate::render::{Budget, Options, Render, SHOOT_JOB, light_path_random, pixel_random};
 use crate::scene::emitter::Emission;
 use crate::scene::{Scene, Surface};
 use crate::transport::cache::{LightCache, LightVertex};
@@ -264,7 +263,7 @@ impl<'a> Walked<'a> {
         let mut observe = Observing { watch: &mut watch, found: &found };
         let mut tally = Tally { record: &mut at, rays: &mut rays, observe: &mut observe };
         for index in paths {
-            let mut random = Random::new(Family::Shoot, u64::from(index), self.passes, self.plan.settings.seed);
+            let mut random = light_path_random(&self.plan, index, self.passes);
             shoot(cx, self.plan.keeps_vertices().then_some(&mut vertices), &mut random, &mut tally);
         }
         (vertices, watch)
@@ -277,8 +276,8 @@ impl<'a> Walked<'a> {
         for (x, y, _) in self.layout.tile_rect(index).pixels() {
             let (px, py) = (self.crop[0] + x, self.crop[1] + y);
             let id = u64::from(py) * u64::from(self.scene.film.width) + u64::from(px);
-            let mut random = Random::new(Family::Gather, id, self.passes, self.plan.settings.seed);
-            let (offset, weight) = self.filter.sample_offset(random.unit2());
+            let mut random = pixel_random(&self.plan, id, self.passes);
+            let (offset, weight) = self.filter.sample_offset(random.axis2());
             let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
             let mut at = At { walked: self, pixel: self.layout.pixel(x, y), found: &found };
             let mut observe = Observing { watch: &mut watch, found: &found };

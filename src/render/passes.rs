@@ -8,7 +8,7 @@ use crate::math::random::Family;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
 use crate::transport::recursive::recursive;
-use crate::transport::settings::Coupling;
+use crate::transport::settings::{Coupling, Plan};
 use crate::transport::shoot::shoot;
 use crate::transport::walk::{Context, Tally};
 use crate::transport::{Contribution, RayCounts, Record};
@@ -87,10 +87,24 @@ fn run_into<S: Sink>(render: &mut Render<'_>, range: Range<u64>) {
     }
 }
 
+/// The random numbers of light path `index` of a pass.
+pub(crate) fn light_path_random(plan: &Plan, index: u32, pass: u64) -> Random {
+    let (index, seed) = (u64::from(index), plan.settings.seed);
+    let random = Random::new(Family::Shoot, index, pass, seed);
+    if plan.settings.stratified { random.with_point(Family::Shoot, pass, index, seed, SHOOT_AXES) } else { random }
+}
+
+/// The random numbers of the pixel with number `id` in the whole film.
+pub(crate) fn pixel_random(plan: &Plan, id: u64, pass: u64) -> Random {
+    let seed = plan.settings.seed;
+    let random = Random::new(Family::Gather, id, pass, seed);
+    if plan.settings.stratified { random.with_point(Family::Gather, id, pass, seed, GATHER_AXES) } else { random }
+}
+
 /// Shoots all light paths of a pass.
 fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat<S::Kept>>>) {
     let plan = &render.plan;
-    let (cx, seed) = (Context::new(render.scene, plan, pass), plan.settings.seed);
+    let cx = Context::new(render.scene, plan, pass);
     let jobs = plan.light_paths.div_ceil(SHOOT_JOB);
     let shots: Vec<Shot<S::Kept>> = (0..jobs)
         .into_par_iter()
@@ -106,10 +120,7 @@ fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<V
             let mut rays = RayCounts::default();
             let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
             for index in paths {
-                let mut random = Random::new(Family::Shoot, u64::from(index), pass, seed);
-                if plan.settings.stratified {
-                    random = random.with_point(Family::Shoot, pass, u64::from(index), seed, SHOOT_AXES);
-                }
+                let mut random = light_path_random(plan, index, pass);
                 let cache = plan.keeps_vertices().then_some(&mut vertices);
                 shoot(cx, cache, &mut random, &mut tally);
             }
@@ -129,7 +140,6 @@ fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<V
 /// Gathers one sample per pixel and pass, adds the splats, and commits the passes to the film.
 fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache, bins: Option<&SplatBins<S::Kept>>) {
     let (scene, plan, filter, crop) = (render.scene, &render.plan, &render.filter, render.crop);
-    let seed = plan.settings.seed;
     let exponent = render.film.exponent();
     let gathers = plan.settings.techniques.gathers();
     let film_width = u64::from(scene.film.width);
@@ -154,10 +164,7 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
                     for (x, y, local) in rect.pixels() {
                         let (px, py) = (crop[0] + x, crop[1] + y);
                         let id = u64::from(py) * film_width + u64::from(px);
-                        let mut random = Random::new(Family::Gather, id, pass, seed);
-                        if plan.settings.stratified {
-                            random = random.with_point(Family::Gather, id, pass, seed, GATHER_AXES);
-                        }
+                        let mut random = pixel_random(plan, id, pass);
                         let (offset, weight) = filter.sample_offset(random.axis2());
                         let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
                         let mut record = PixelRecord { sink: &mut sink, local };

@@ -37,7 +37,12 @@ fn effort(samples: u64, runs: u32, seed: u64) -> Effort {
 }
 
 fn report(scene: &Scene, reference: &Reference, effort: &Effort, estimators: &[Estimator]) -> SceneReport {
-    let walker = |e: &Estimator| Box::new(Walker::new(scene, *e)) as Box<dyn Contender + '_>;
+    let walker = |e: &Estimator| {
+        let mut options = Options::for_scene(scene, *e);
+        // What is known is the variance of independent samples.
+        options.settings.stratified = false;
+        Box::new(Walker::with(e.name().into(), scene, options)) as Box<dyn Contender + '_>
+    };
     let mut contenders: Vec<_> = estimators.iter().map(walker).collect();
     let entries = race(&mut contenders, reference, effort, &|| false, &mut |_| {});
     let subject = Subject { name: "test".into(), path: Path::new("test.xml"), scene };

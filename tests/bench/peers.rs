@@ -17,7 +17,7 @@ fn with_python(room: &Room, script: &str) -> (i32, String) {
         .env("PATH", path)
         .arg("bench")
         .arg(room.path("ball.xml"))
-        .args(["-e", "gather", "--peer", "mitsuba", "--spp", "2", "--runs", "2", "--reference-time", "1s", "-o"])
+        .args(["-e", "gather", "--peer", "mitsuba", "--spp", "2", "--runs", "4", "--reference-time", "1s", "-o"])
         .arg(room.path("out"))
         .output()
         .expect("the program runs");
@@ -44,7 +44,7 @@ fn a_peer_that_fails_is_reported_and_the_others_go_on() {
         let report = room.report();
         let failure = contender(&report, 1)["failure"].as_str().unwrap_or_default().to_owned();
         assert!(failure.contains(reason), "{script}: {failure}");
-        assert_eq!(contender(&report, 0)["runs"].as_array().map(Vec::len), Some(2), "{script}");
+        assert_eq!(contender(&report, 0)["runs"].as_array().map(Vec::len), Some(4), "{script}");
     }
 }
 

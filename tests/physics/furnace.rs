@@ -81,13 +81,14 @@ fn radiance_is_constant(world: &Scene, estimator: Estimator, passes: u64) {
 /// Means of 16 × 16 blocks within 3 standard errors wherever those are at most 0.5 %. Of the 12 block
 /// channels of a picture one may be beyond (0.27 % each).
 fn blocks_are_constant(picture: &nephroid::render::Picture, estimator: Estimator) {
-    let (w, side) = (picture.width as usize, 16);
+    let (w, h, side) = (picture.width as usize, picture.height as usize, 16);
     let (mut tested, mut beyond, mut worst) = (0, 0, 0.0f64);
-    for by in (0..picture.height as usize).step_by(side) {
+    for by in (0..h).step_by(side) {
         for bx in (0..w).step_by(side) {
             for c in 0..3 {
-                let pixels = (by..by + side).flat_map(|y| (bx..bx + side).map(move |x| y * w + x));
-                let n = (side * side) as f64;
+                let (rows, columns) = (by..(by + side).min(h), bx..(bx + side).min(w));
+                let n = (rows.len() * columns.len()) as f64;
+                let pixels = rows.flat_map(|y| columns.clone().map(move |x| y * w + x));
                 let (m, v) = pixels.fold((0.0, 0.0), |(m, v), i| {
                     (m + f64::from(picture.mean[i][c]) / n, v + f64::from(picture.variance[i][c]) / (n * n))
                 });

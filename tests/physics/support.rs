@@ -84,8 +84,8 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
     let mut settings = settings.clone();
     settings.max_length = settings.max_length.min(effort.max_length);
     // Any constant is a valid number of vertices for the weights.
-    let plan =
-        Plan { guide: learned(scene, &settings), ..Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0) };
+    let guide = if settings.guided { learned(scene, &settings) } else { Guide::default() };
+    let plan = Plan { guide, ..Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0) };
     let renders: Vec<Vec<Vec<f64>>> = (0..effort.renders)
         .into_par_iter()
         .map(|render| {
