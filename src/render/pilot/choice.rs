@@ -13,7 +13,7 @@
 //! noise of a pass as relMSE counts it; times the cost of a pass it is the error at equal time. One
 //! mixture judges all candidates, also on paths that they would hardly ever find themselves.
 //!
-//! Costs are counts of operations times weights measured once ([`Costs`]), so that the choice is a
+//! Costs are counts of operations times fixed weights ([`Costs`]), so that the choice is a
 //! function of scene, settings and seed alone.
 
 use super::{Cell, Decisions, JOB, Nothing, Pilot};
@@ -44,8 +44,8 @@ const LESS_MUST_WIN: f64 = 1.02;
 /// A single path counts for at most so many times the mean.
 const MOST: f64 = 300.0;
 
-/// Cost of operations, in units of a step of a gathering walk. Measured on the scenes of `scenes/` by
-/// regression of the time of a pass over its counts.
+/// Cost of operations, in units of a step of a gathering walk. Estimates from the profile of a few scenes;
+/// only ratios matter, and only as far as they change the order of candidates.
 struct Costs {
     gather_walk: f64,
     gather_step: f64,
