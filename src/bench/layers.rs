@@ -28,12 +28,13 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::cell::Cell;
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// Lengths that are told apart; the last stands for all longer ones.
 pub const LENGTHS: usize = 10;
-/// Room for joins.
-const TECHNIQUES: usize = 8;
+/// Number of joins.
+const TECHNIQUES: usize = Technique::ALL.len();
 /// Tiles that are looked at, at most (as many as 512 × 384 pixels have).
 const TILES: usize = 768;
 /// Fewest passes that a variance is taken of.
@@ -196,8 +197,6 @@ struct Walked<'a> {
     /// Every so many tiles one is looked at.
     step: usize,
     tiles: Vec<Tile>,
-    /// Names of the joins that were met.
-    names: Vec<Option<Technique>>,
     passes: u64,
 }
 
@@ -218,7 +217,6 @@ impl<'a> Walked<'a> {
             layout,
             step,
             tiles: vec![none; layout.tiles().div_ceil(step)],
-            names: vec![None; TECHNIQUES],
             passes: 0,
         })
     }
@@ -226,31 +224,24 @@ impl<'a> Walked<'a> {
     fn pass(&mut self) {
         let shots: Vec<_> = (0..self.plan.light_paths.div_ceil(SHOOT_JOB)).into_par_iter().map(|job| self.shoot(job)).collect();
         let (mut pieces, mut events, mut bins) = (Vec::new(), Vec::new(), vec![Vec::new(); self.tiles.len()]);
-        let mut names = self.names.clone();
         for (vertices, watch) in shots {
             pieces.push(vertices);
             events.extend(watch.cached);
             for f in watch.found {
                 bins[Layout::tile_of(f.pixel) / self.step].push(f);
             }
-            join_names(&mut names, &watch.names);
         }
         let cache = LightCache::new(pieces, self.plan.merge_radius(self.passes));
         let gathers = self.plan.settings.techniques.gathers();
         let mut tiles = std::mem::take(&mut self.tiles);
-        let met: Vec<_> = tiles
-            .par_iter_mut()
-            .zip(&bins)
-            .enumerate()
-            .map(|(i, (tile, splats))| {
-                splats.iter().for_each(|f| tile.add(f));
-                let names = if gathers { self.gather(i * self.step, tile, &cache, &events) } else { vec![None; TECHNIQUES] };
-                tile.commit();
-                names
-            })
-            .collect();
-        met.iter().for_each(|m| join_names(&mut names, m));
-        (self.tiles, self.names) = (tiles, names);
+        tiles.par_iter_mut().zip(&bins).enumerate().for_each(|(i, (tile, splats))| {
+            splats.iter().for_each(|f| tile.add(f));
+            if gathers {
+                self.gather(i * self.step, tile, &cache, &events);
+            }
+            tile.commit();
+        });
+        self.tiles = tiles;
         self.passes += 1;
     }
 
@@ -269,7 +260,7 @@ impl<'a> Walked<'a> {
         (vertices, watch)
     }
 
-    fn gather(&self, index: usize, tile: &mut Tile, cache: &LightCache, events: &[Events]) -> Vec<Option<Technique>> {
+    fn gather(&self, index: usize, tile: &mut Tile, cache: &LightCache, events: &[Events]) {
         let cx = Context::new(self.scene, &self.plan, self.passes);
         let (found, mut rays) = (Cell::new(None), RayCounts::default());
         let mut watch = Watch::new(events);
@@ -285,7 +276,6 @@ impl<'a> Walked<'a> {
             gather(cx, raster, weight, cache, &mut random, &mut tally);
             watch.found.drain(..).for_each(|f| tile.add(&f));
         }
-        watch.names
     }
 
     /// Tile and place of a pixel of the whole film, if it is looked at.
@@ -318,11 +308,16 @@ impl<'a> Walked<'a> {
         for s in &mut shares {
             *s = Share { energy: s.energy / light, noise: s.noise / pixels };
         }
-        let of = |t: usize| self.names[t].map(|name| (name_of(name), shares[t * LENGTHS..(t + 1) * LENGTHS].to_vec()));
+        // Joins that found nothing have no layers.
+        let met = |layers: &Range<usize>| self.tiles.iter().any(|t| t.layers[layers.clone()].iter().any(Option::is_some));
+        let of = |technique: Technique| {
+            let layers = technique as usize * LENGTHS..(technique as usize + 1) * LENGTHS;
+            met(&layers).then(|| (name_of(technique), shares[layers].to_vec()))
+        };
         Layers {
             passes: self.passes,
             seconds_per_pass: time.as_secs_f64() / n,
-            techniques: (0..TECHNIQUES).filter_map(of).collect(),
+            techniques: Technique::ALL.into_iter().filter_map(of).collect(),
             classes: shares[TECHNIQUES * LENGTHS..].to_vec(),
         }
     }
@@ -336,10 +331,6 @@ fn name_of(technique: Technique) -> String {
         space.into_iter().chain(c.to_lowercase())
     });
     spaced.collect()
-}
-
-fn join_names(into: &mut [Option<Technique>], more: &[Option<Technique>]) {
-    into.iter_mut().zip(more).for_each(|(i, m)| *i = i.or(*m));
 }
 
 /// Notes where a contribution falls and what it is worth.
@@ -369,13 +360,11 @@ struct Watch<'a> {
     cached: Vec<Events>,
     cache: &'a [Events],
     found: Vec<Found>,
-    names: Vec<Option<Technique>>,
 }
 
 impl<'a> Watch<'a> {
     fn new(cache: &'a [Events]) -> Self {
-        let (events, names) = (Events::default(), vec![None; TECHNIQUES]);
-        Self { events, pending: false, cached: Vec::new(), cache, found: Vec::new(), names }
+        Self { events: Events::default(), pending: false, cached: Vec::new(), cache, found: Vec::new() }
     }
 
     /// Events so far, the vertex last reached as one that is not a Dirac event.
@@ -423,9 +412,7 @@ impl Observe for Observing<'_, '_> {
             }
             Technique::Hit | Technique::NextEvent => watch.here(),
         };
-        let technique = join.technique as usize;
-        watch.names[technique] = Some(join.technique);
-        let layer = technique * LENGTHS + (join.length as usize).clamp(1, LENGTHS) - 1;
+        let layer = join.technique as usize * LENGTHS + (join.length as usize).clamp(1, LENGTHS) - 1;
         watch.found.push(Found { pixel, value, technique: layer as u8, class: events.class() as u8 });
     }
 }

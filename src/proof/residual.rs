@@ -31,7 +31,7 @@ use crate::transport::cache::LightCache;
 use crate::transport::settings::{Plan, Settings};
 use crate::transport::vertex::{Scatter, Vertex};
 use crate::transport::walk::{Context, Join, Observe, Tally, spawn};
-use crate::transport::{Contribution, RayCounts, Record, gather, shoot};
+use crate::transport::{RayCounts, gather, shoot};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::fmt::Write;
@@ -276,7 +276,7 @@ impl<'a> Test<'a> {
     fn follow(&self, plan: &Plan, ray: Ray, parallel: bool, random: &mut Random, beside: &mut impl Observe) {
         let cx = Context::new(self.scene, plan, 0);
         let mut rays = RayCounts::default();
-        let mut tally = Tally { record: &mut Nothing, rays: &mut rays, observe: beside };
+        let mut tally = Tally { record: &mut (), rays: &mut rays, observe: beside };
         match self.equation {
             Equation::Rendering => {
                 let start = SensorRay { o: ray.o, d: ray.d, t_max: ray.t_max, lens: ray.o };
@@ -420,12 +420,6 @@ impl<F: FnMut(Kind, f64)> Observe for Beside<'_, F> {
             self.add(kind, join.value * self.factor);
         }
     }
-}
-
-struct Nothing;
-impl Record for Nothing {
-    fn gathered(&mut self, _: Contribution) {}
-    fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
 }
 
 /// A random point: a ray of the walker, after any number of scatterings.

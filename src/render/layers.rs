@@ -104,7 +104,7 @@ pub struct Joins {
 }
 
 /// Number of techniques.
-const TECHNIQUES: usize = 5;
+const TECHNIQUES: usize = Technique::ALL.len();
 
 impl Joins {
     /// Longest row that can be asked for.
@@ -133,7 +133,7 @@ impl Joins {
             }
         }
         if max_length > longest {
-            for technique in [Technique::Hit, Technique::NextEvent, Technique::Connect, Technique::Splat, Technique::Merge] {
+            for technique in Technique::ALL {
                 out.push(t, Join { length: longest + 1, light_vertices: None, technique });
             }
         }
@@ -146,14 +146,7 @@ impl Joins {
     }
 
     fn push(&mut self, t: Techniques, join: Join) {
-        let allowed = match join.technique {
-            Technique::Hit => t.hit,
-            Technique::NextEvent => t.next_event,
-            Technique::Connect => t.connect,
-            Technique::Splat => t.splat,
-            Technique::Merge => t.merge,
-        };
-        if allowed {
+        if t.allows(join.technique) {
             let at = self.index(join.technique, join.length, join.light_vertices.unwrap_or(0));
             self.table[at] = self.list.len() as u16;
             self.list.push(join);

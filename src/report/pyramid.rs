@@ -51,17 +51,6 @@ impl Figures {
     }
 }
 
-/// Name of a technique as on the command line.
-pub fn technique_name(technique: Technique) -> &'static str {
-    match technique {
-        Technique::Hit => "hit",
-        Technique::NextEvent => "nee",
-        Technique::Connect => "connect",
-        Technique::Splat => "splat",
-        Technique::Merge => "merge",
-    }
-}
-
 /// One entry for each join of the layers, in their order; none where they are no joins.
 pub fn table(layers: &Layers, whole: &Film) -> Vec<Entry> {
     let Partition::Joins(joins) = &layers.partition else { return Vec::new() };
@@ -82,7 +71,7 @@ fn entry(join: &Join, films: &[Film], energy: f64) -> Entry {
         and_longer: join.light_vertices.is_none(),
         s: join.light_vertices,
         t: join.light_vertices.map(|s| join.length + 1 - s + u32::from(join.technique == Technique::Merge)),
-        technique: technique_name(join.technique),
+        technique: join.technique.name(),
         weighted,
         raw,
         share_of_energy: ratio(weighted.mean, energy),

@@ -52,6 +52,22 @@ pub enum Technique {
     Merge,
 }
 
+impl Technique {
+    /// All, in the order of their numbers.
+    pub const ALL: [Self; 5] = [Self::Hit, Self::NextEvent, Self::Connect, Self::Splat, Self::Merge];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hit => "hit",
+            Self::NextEvent => "nee",
+            Self::Connect => "connect",
+            Self::Splat => "splat",
+            Self::Merge => "merge",
+        }
+    }
+}
+
 /// One weighted path of a measurement.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Contribution {
@@ -76,6 +92,12 @@ pub trait Record {
     /// A path that is seen at `raster` (pixels of the whole film); `random` chooses the pixel of the
     /// reconstruction filter.
     fn splatted(&mut self, raster: Vec2, random: &mut Random, contribution: Contribution);
+}
+
+/// The unit type records nothing: for those who only watch.
+impl Record for () {
+    fn gathered(&mut self, _: Contribution) {}
+    fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
 }
 
 /// Rays cast, for statistics.

@@ -1,5 +1,6 @@
 //! What a render is asked to do: which joins, which paths, how many of each.
 
+use super::Technique;
 use super::class::PathFilter;
 use super::mis::Heuristic;
 use super::mutant::{Mutant, planted};
@@ -45,6 +46,17 @@ impl Techniques {
             }
         }
         Ok(t)
+    }
+
+    /// Whether a join is among them.
+    pub fn allows(self, technique: Technique) -> bool {
+        match technique {
+            Technique::Hit => self.hit,
+            Technique::NextEvent => self.next_event,
+            Technique::Connect => self.connect,
+            Technique::Splat => self.splat,
+            Technique::Merge => self.merge,
+        }
     }
 
     /// As a list for people.

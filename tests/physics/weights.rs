@@ -6,6 +6,7 @@ use glam::Vec2;
 use nephroid::math::Random;
 use nephroid::math::random::Family;
 use nephroid::scene::emitter::Guide;
+use nephroid::transport::RayCounts;
 use nephroid::transport::cache::LightCache;
 use nephroid::transport::gather::gather;
 use nephroid::transport::mis::Heuristic;
@@ -13,13 +14,6 @@ use nephroid::transport::reference::{Densities, Testimony, Witness, weights, wei
 use nephroid::transport::settings::{Plan, Settings, Techniques};
 use nephroid::transport::shoot::shoot;
 use nephroid::transport::walk::{Context, Tally};
-use nephroid::transport::{Contribution, RayCounts, Record};
-
-struct Nowhere;
-impl Record for Nowhere {
-    fn gathered(&mut self, _: Contribution) {}
-    fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
-}
 
 /// Random densities of a random path, as a brute-force oracle for the algebra.
 fn random_path(random: &mut Random) -> (Densities, Plan) {
@@ -83,7 +77,7 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
     let crop = film.crop.unwrap_or([0, 0, film.width, film.height]);
     for pass in 0.. {
         witness.next_pass();
-        let mut tally = Tally { record: &mut Nowhere, rays: &mut rays, observe: &mut witness };
+        let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut witness };
         let mut vertices = Vec::new();
         tally.observe.expect_shooting(true);
         for i in 0..64 {

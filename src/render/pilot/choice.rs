@@ -16,7 +16,7 @@
 //! Costs are counts of operations times fixed weights ([`Costs`]), so that the choice is a
 //! function of scene, settings and seed alone.
 
-use super::{Cell, Decisions, JOB, Nothing, Pilot};
+use super::{Cell, Decisions, JOB, Pilot};
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::scene::Surface;
@@ -84,8 +84,8 @@ struct Counts {
 struct Evidence {
     /// C² relative to the square of the picture, as a whole pass would find it.
     square: f64,
-    /// r_τ: hit, next event, connection, splat, merge.
-    shares: [f64; 5],
+    /// r_τ by the number of the join.
+    shares: [f64; Technique::ALL.len()],
     /// Without noise where next events are on: a delta light seen at the first vertex.
     steady: bool,
 }
@@ -120,7 +120,13 @@ impl Candidate {
     fn noise(&self, evidence: &[Evidence]) -> f64 {
         let on = |b: bool| if b { 1.0 } else { 0.0 };
         let n = self.light_paths;
-        let numbers = [1.0, on(self.next_event), on(self.connect), n, n * on(self.merge)];
+        let numbers = Technique::ALL.map(|technique| match technique {
+            Technique::Hit => 1.0,
+            Technique::NextEvent => on(self.next_event),
+            Technique::Connect => on(self.connect),
+            Technique::Splat => n,
+            Technique::Merge => n * on(self.merge),
+        });
         let one = |e: &Evidence| {
             if e.steady && self.next_event {
                 return 0.0;
@@ -275,7 +281,7 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
             for index in job * JOB..((job + 1) * JOB).min(walks) {
                 let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 35, 0, plan.settings.seed);
                 let raster = pilot.raster(index, walks, &mut random);
-                let mut tally = Tally { record: &mut Nothing, rays: &mut rays, observe: &mut watch };
+                let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut watch };
                 gather(cx, raster, 1.0, &cache, &mut random, &mut tally);
                 let Some(cell) = pilot.cell(raster) else { continue };
                 for t in watch.witness.seen.drain(..) {
@@ -295,9 +301,9 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
     evidence.extend(shot.evidence);
     clip(&mut evidence);
     let judge = |c: &Candidate| {
-        let all = c.next_event && c.connect;
-        let handicap = if c.merge { MERGE_MUST_WIN } else { 1.0 } * if all { 1.0 } else { LESS_MUST_WIN };
-        c.noise(&evidence) * c.cost(&eye_counts, &light_counts, merges) * handicap
+        let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };
+        let lacks = if c.next_event && c.connect { 1.0 } else { LESS_MUST_WIN };
+        c.noise(&evidence) * c.cost(&eye_counts, &light_counts, merges) * blurs * lacks
     };
     let candidates = Candidate::all(pilot.settings, pixels);
     let best = candidates.iter().min_by(|a, b| judge(a).total_cmp(&judge(b)));
@@ -315,15 +321,9 @@ fn evidence(cx: Context<'_>, t: &Testimony, square: f64, often: f64) -> Option<E
     if !(value > 0.0 && value.is_finite() && square > 0.0) {
         return None;
     }
-    let mut shares = [0.0; 5];
+    let mut shares = [0.0; Technique::ALL.len()];
     for ((technique, _), weight) in t.path.weights(cx) {
-        shares[match technique {
-            Technique::Hit => 0,
-            Technique::NextEvent => 1,
-            Technique::Connect => 2,
-            Technique::Splat => 3,
-            Technique::Merge => 4,
-        }] += weight;
+        shares[technique as usize] += weight;
     }
     let steady = t.path.light_delta && t.path.vertices.len() == 1;
     shares.iter().sum::<f64>().is_finite().then_some(Evidence { square: often * value * value / square, shares, steady })

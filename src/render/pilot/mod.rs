@@ -218,12 +218,6 @@ impl Observe for Footprints {
     }
 }
 
-struct Nothing;
-impl Record for Nothing {
-    fn gathered(&mut self, _: Contribution) {}
-    fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
-}
-
 /// What a shooting job leaves.
 struct Shot {
     seen: Vec<Seen>,
@@ -257,7 +251,7 @@ impl<'a> Pilot<'a> {
                 let raster = self.raster(index, SCOUTS, &mut random);
                 let start = self.scene.sensor.sample_ray(raster, random.unit2());
                 footprints.density = self.scene.sensor.density(start.d);
-                let mut tally = Tally { record: &mut Nothing, rays: &mut RayCounts::default(), observe: &mut footprints };
+                let mut tally = Tally { record: &mut (), rays: &mut RayCounts::default(), observe: &mut footprints };
                 follow(Context::new(self.scene, &plan, 0), start, 1.0, &LightCache::default(), &mut random, &mut tally);
             }
             footprints.found
@@ -395,7 +389,7 @@ impl<'a> Pilot<'a> {
             let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 32, u64::from(round), plan.settings.seed);
             let raster = self.raster(index, walks, &mut random);
             let mut joins = Joins::default();
-            let mut tally = Tally { record: &mut Nothing, rays: &mut rays, observe: &mut joins };
+            let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut joins };
             gather(cx, raster, 1.0, cache, &mut random, &mut tally);
             let Some(cell) = self.cell(raster) else { continue };
             for (value, technique, vertex) in joins.0.into_iter().filter(|(value, ..)| value.is_finite()) {
