@@ -86,7 +86,7 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
             }
         }
         let (vertices, lessons) = pilot.round(&decisions, round, paths);
-        if connects {
+        if decisions.settings.techniques.connect {
             decisions.vertices_per_path = vertices as f64 / f64::from(paths);
         }
         if settings.guided {
@@ -356,7 +356,7 @@ impl<'a> Pilot<'a> {
 
     fn shoot(&self, plan: &Plan, round: u32, job: u32, paths: u32) -> Shot {
         let cx = Context::new(self.scene, plan, 0);
-        let keeps = self.settings.techniques.connect || plan.keeps_vertices();
+        let keeps = plan.settings.techniques.connect || plan.keeps_vertices();
         let mut observe = Collect { pilot: self, seen: vec![], starts: vec![], guide: &plan.guide };
         let (mut vertices, mut owners, mut pending, mut rays) = (vec![], vec![], vec![], RayCounts::default());
         for index in job * JOB..((job + 1) * JOB).min(paths) {
