@@ -3,7 +3,7 @@
 //! With hits and next events alone this is path tracing [Kajiya 1986]; with the sums of [`super::mis`]
 //! it is the eye's half of bidirectional path tracing [Veach 1997, ch. 10].
 
-use super::cache::LightCache;
+use super::cache::{LightCache, LightVertex};
 use super::class::{Finished, Symbol};
 use super::mis::{self, Partial};
 use super::mutant::{Mutant, planted};
@@ -328,27 +328,44 @@ fn connect<R: Record, O: Observe>(
         if !scene.geometry.visible(end(&vertex.surface), end(&y.surface)) {
             continue;
         }
-        let path = Finished {
-            from_eye: plan.settings.paths.forward(walk.class, Symbol::D),
-            from_light: plan.settings.paths.backward(y.class, Symbol::D),
-            length,
-            first_delta: walk.first_delta,
-            last_delta: y.first_delta,
-            light_delta: y.light_delta,
-        };
-        let join = Join {
-            technique: Technique::Connect,
-            weight,
-            length,
-            light: None,
-            emitter: y.emitter,
-            light_delta: y.light_delta,
-            light_vertex: picked as usize,
-            lens: Vec3::ZERO,
-            value,
-        };
-        finish(cx, path, value, join, y.length + 1, tally);
+        meet(cx, walk, Technique::Connect, (picked, y), length, (value, weight), tally);
     }
+}
+
+/// Hands on a path of two walks: the gathering one, and that of light vertex `y`, number `index` of the cache.
+#[inline]
+fn meet<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    technique: Technique,
+    (index, y): (u32, &LightVertex),
+    length: u32,
+    (value, weight): (Spectrum, f32),
+    tally: &mut Tally<'_, R, O>,
+) {
+    let paths = &cx.plan.settings.paths;
+    // A merged vertex is an event of the gathering walk already.
+    let from_light = if technique == Technique::Merge { y.class } else { paths.backward(y.class, Symbol::D) };
+    let path = Finished {
+        from_eye: paths.forward(walk.class, Symbol::D),
+        from_light,
+        length,
+        first_delta: walk.first_delta,
+        last_delta: y.first_delta,
+        light_delta: y.light_delta,
+    };
+    let join = Join {
+        technique,
+        weight,
+        length,
+        light: None,
+        emitter: y.emitter,
+        light_delta: y.light_delta,
+        light_vertex: index as usize,
+        lens: Vec3::ZERO,
+        value,
+    };
+    finish(cx, path, value, join, y.length + 1, tally);
 }
 
 /// Merges `vertex`, reached by a Dirac event, with the light vertices around it that were so as well.
@@ -376,25 +393,6 @@ fn merge<R: Record, O: Observe>(
         if value.is_black() {
             return;
         }
-        let path = Finished {
-            from_eye: plan.settings.paths.forward(walk.class, Symbol::D),
-            from_light: y.class,
-            length,
-            first_delta: walk.first_delta,
-            last_delta: y.first_delta,
-            light_delta: y.light_delta,
-        };
-        let join = Join {
-            technique: Technique::Merge,
-            weight,
-            length,
-            light: None,
-            light_delta: y.light_delta,
-            emitter: y.emitter,
-            light_vertex: index as usize,
-            lens: Vec3::ZERO,
-            value,
-        };
-        finish(cx, path, value, join, y.length + 1, tally);
+        meet(cx, walk, Technique::Merge, (index, y), length, (value, weight), tally);
     });
 }
