@@ -3,6 +3,8 @@
 //! is planted for the whole process.
 #![cfg(feature = "mutants")]
 
+#[path = "physics/mirrors.rs"]
+mod mirrors;
 #[path = "physics/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
@@ -32,7 +34,7 @@ struct Check {
     b: (&'static str, u32),
 }
 
-const CHECKS: [Check; 6] = [
+const CHECKS: [Check; 7] = [
     Check {
         mutant: Mutant::AdjointShadingNormal,
         named: "agreement::shading_normals::joins",
@@ -81,6 +83,14 @@ const CHECKS: [Check; 6] = [
         a: ("nee", 3),
         b: ("hit,nee,splat,connect", 3),
     },
+    Check {
+        mutant: Mutant::MergeWeight,
+        named: "merging::merges_find_what_hits_find",
+        scene: "glass and mirror",
+        paths: "E .* S D S+ L",
+        a: ("hit", 3),
+        b: ("hit,merge", 3),
+    },
 ];
 
 /// Smallest corrected p over path lengths 2 … 5.
@@ -95,6 +105,7 @@ fn p_of(check: &Check) -> f64 {
             min_length: 2,
             rr_depth,
             connections: 2,
+            merge_radius: Some(0.02),
             seed,
             ..Settings::default()
         };
@@ -117,6 +128,21 @@ fn planted_mistakes_are_caught() {
         assert!(sound > 1e-5, "{:?}: the sound estimators disagree, p = {sound:.2e}", check.mutant);
         assert!(mistaken < 1e-5, "{:?}: {} does not notice, p = {mistaken:.2e}", check.mutant, check.named);
     }
+}
+
+/// `merging::only_merges_find_a_mirrored_point_light_in_a_mirror_and_they_find_it_right` notices a mistake in a merge.
+#[test]
+fn planted_mistakes_spoil_merges() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let [sound, mistaken] = [None, Some(Mutant::MergeCosine)].map(|m| {
+        plant(m);
+        let (worst, tested) = mirrors::deviation(&mirrors::picture("merge"));
+        plant(None);
+        assert!(tested >= 8, "{tested} blocks");
+        worst
+    });
+    println!("MergeCosine: {sound:.2} without, {mistaken:.2} with the mistake");
+    assert!(sound < 1.0 && mistaken > 1.0, "{sound} {mistaken}");
 }
 
 /// The command `adjoint` notices a mistake in either walker.

@@ -71,7 +71,7 @@ pub fn run(args: &BenchArgs, command: &[OsString]) -> Result<Exit, Failure> {
 
 /// By name; the known ones where there is none.
 fn estimator(name: &str) -> Result<Estimator, Failure> {
-    let known = Estimator::NAMES.join(", ");
+    let known = Estimator::ALL.map(Estimator::name).join(", ");
     Estimator::parse(name).ok_or_else(|| Failure::usage(format!("unknown estimator `{name}` (known: {known})")))
 }
 

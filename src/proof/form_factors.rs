@@ -25,18 +25,20 @@ fn shape(kind: &str, flip: bool, transform: &str) -> String {
     )
 }
 
+/// What turns the square [−1, 1]² into each face of the cube [−1, 1]³, normals inwards: −z, +z, −y, +y, −x, +x.
+pub const CUBE_FACES: [&str; 6] = [
+    r#"<translate z="-1"/>"#,
+    r#"<rotate y="1" angle="180"/><translate z="1"/>"#,
+    r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#,
+    r#"<rotate x="1" angle="90"/><translate y="1"/>"#,
+    r#"<rotate y="1" angle="90"/><translate x="-1"/>"#,
+    r#"<rotate y="1" angle="-90"/><translate x="1"/>"#,
+];
+
 /// Form factors between the six faces of a cube, opposite ones at 2i and 2i + 1, from so many elements with so many
 /// rays each.
 pub fn cube(elements: usize, rays: u32, seed: u64) -> Result<Vec<Vec<f64>>, Refused> {
-    let turns = [
-        r#"<translate z="-1"/>"#,
-        r#"<rotate y="1" angle="180"/><translate z="1"/>"#,
-        r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#,
-        r#"<rotate x="1" angle="90"/><translate y="1"/>"#,
-        r#"<rotate y="1" angle="90"/><translate x="-1"/>"#,
-        r#"<rotate y="1" angle="-90"/><translate x="1"/>"#,
-    ];
-    let world = scene(&turns.map(|turn| shape("rectangle", false, turn)).concat())?;
+    let world = scene(&CUBE_FACES.map(|turn| shape("rectangle", false, turn)).concat())?;
     let mesh = Elements::new(&world, elements)?;
     let factors = Factors::cast(&world, &mesh, &vec![rays; mesh.len()], seed);
     let (mut sums, mut areas) = (vec![vec![0.0; 6]; 6], [0.0; 6]);

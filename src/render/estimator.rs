@@ -29,10 +29,11 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// Names on the command line.
-    pub const NAMES: [&str; 7] = ["gather", "shoot", "bidirectional", "auto", "local", "local-unshadowed", "recursive"];
+    /// All.
+    pub const ALL: [Self; 7] =
+        [Self::Gather, Self::Shoot, Self::Bidirectional, Self::Auto, Self::Local, Self::LocalUnshadowed, Self::Recursive];
 
-    /// Its name.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gather => "gather",
@@ -47,9 +48,7 @@ impl Estimator {
 
     /// By name.
     pub fn parse(name: &str) -> Option<Self> {
-        let all =
-            [Self::Gather, Self::Shoot, Self::Bidirectional, Self::Auto, Self::Local, Self::LocalUnshadowed, Self::Recursive];
-        all.into_iter().find(|e| e.name() == name)
+        Self::ALL.into_iter().find(|e| e.name() == name)
     }
 
     /// What an integrator element of a scene file means by its name.

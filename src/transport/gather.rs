@@ -389,7 +389,8 @@ fn merge<R: Record, O: Observe>(
         let Some(k) = vertex.kernel(EQUATION, y.w_back) else { return };
         let weight = mis::merge(h, cx.eta, partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
         // Flux per area is irradiance: the kernel's cosine is already in it.
-        let value = walk.throughput * y.throughput * k.value * (factor * weight / k.cos_g);
+        let cos_g = if planted(Mutant::MergeCosine) { 1.0 } else { k.cos_g };
+        let value = walk.throughput * y.throughput * k.value * (factor * weight / cos_g);
         if value.is_black() {
             return;
         }

@@ -18,6 +18,10 @@ pub enum Mutant {
     RouletteFactor = 5,
     /// The geometric cosine is dropped where a solid angle becomes an area.
     AreaCosine = 6,
+    /// A merge takes the cosine twice: in the kernel and in the flux per area.
+    MergeCosine = 7,
+    /// A walk forgets that a merge was possible at the vertex before.
+    MergeWeight = 8,
 }
 
 #[cfg(feature = "mutants")]

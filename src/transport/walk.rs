@@ -105,7 +105,7 @@ impl Walk {
         let h = cx.plan.settings.heuristic;
         self.throughput *= s.weight;
         self.k = if s.delta {
-            if self.may_merge {
+            if self.may_merge && !planted(Mutant::MergeWeight) {
                 partial = partial.and_merge(h, cx.eta, arrival.p_a, self.cos_from * arrival.inv_d2);
             }
             partial.at_delta(h, s.p_rev, s.dirac_ratio)

@@ -1,5 +1,6 @@
 //! Small diffuse scenes.
 
+use nephroid::proof::form_factors::CUBE_FACES;
 use nephroid::scene::Scene;
 
 /// The built scene of a text.
@@ -31,19 +32,11 @@ pub fn shape(kind: &str, flip: bool, transform: &str, reflectance: &str, radianc
 
 /// Six rectangles around the unit cube, shape by shape: −z, +z, −y, +y, −x, +x.
 pub fn six_walls(look: impl Fn(usize) -> (&'static str, &'static str)) -> String {
-    let turns = [
-        r#"<translate z="-1"/>"#,
-        r#"<rotate y="1" angle="180"/><translate z="1"/>"#,
-        r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#,
-        r#"<rotate x="1" angle="90"/><translate y="1"/>"#,
-        r#"<rotate y="1" angle="90"/><translate x="-1"/>"#,
-        r#"<rotate y="1" angle="-90"/><translate x="1"/>"#,
-    ];
     let wall = |(i, turn): (usize, &&str)| {
         let (reflectance, radiance) = look(i);
         shape("rectangle", false, &format!(r#"{turn}<scale value="0.5"/>"#), reflectance, radiance)
     };
-    turns.iter().enumerate().map(wall).collect()
+    CUBE_FACES.iter().enumerate().map(wall).collect()
 }
 
 /// Slope of the least-squares line through (ln x, ln y).

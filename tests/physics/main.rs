@@ -6,6 +6,7 @@ mod choice;
 mod determinism;
 mod furnace;
 mod merging;
+mod mirrors;
 mod scenes;
 mod splats;
 mod support;
