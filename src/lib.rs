@@ -30,9 +30,9 @@
 //! render.run(&Budget::passes(64), |_| Control::Continue);
 //! let picture = render.picture(); // mean and variance of every pixel
 //!
-//! // One pixel as one number, by gathering, by shooting and by both, each with its standard error.
+//! // One pixel as one number, by gathering, by shooting, by both and with merges, each with its standard error.
 //! let phi = PixelMeasurement::new(&scene, &options, (200, 120), 1000)?;
-//! println!("{:?} {:?} {:?}", phi.gather, phi.shoot, phi.bidirectional);
+//! println!("{:?} {:?} {:?} {:?}", phi.gather, phi.shoot, phi.bidirectional, phi.merging);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -4,7 +4,7 @@ use super::effort::Mark;
 use super::layers::{Layers, layers};
 use super::reference::Reference;
 use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Render};
-use crate::report::Picture;
+use crate::report::{Picture, memory};
 use crate::scene::Scene;
 use crate::transport::RayCounts;
 use crate::transport::settings::Coupling;
@@ -120,7 +120,7 @@ impl Contender for Walker<'_> {
         }
         run.variance = Picture::of_film(render.film()).variance;
         run.rays = Some(render.statistics().rays);
-        run.memory = resident_memory();
+        run.memory = memory::resident();
         Ok(Some(run))
     }
 }
@@ -168,11 +168,4 @@ impl Clock {
         what(self.elapsed().as_secs_f64());
         self.paused += before.elapsed();
     }
-}
-
-/// Resident memory of this process in bytes, where the system tells it.
-fn resident_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find(|l| l.starts_with("VmRSS:"))?;
-    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kb| kb * 1024)
 }

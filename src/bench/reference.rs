@@ -1,8 +1,9 @@
 //! What errors are taken from: a given image, or one made once and kept beside the scene.
 //!
-//! A reference that is made is bidirectional, with random numbers that no run uses. It is kept as
-//! `NAME.reference-HASH.exr`, named by the content of the scene, and made anew only where more is wanted
-//! than it has. Its variance is kept with it: what an error owes to it is subtracted
+//! A reference that is made is bidirectional, with random numbers that no run uses; with merges where every
+//! unbiased join is blind, or so rarely finds the light that `auto` merges (their blur shrinks with the
+//! passes, of which a reference has far more than a run). It is kept as `NAME.reference-HASH.exr`, named by
+//! the content of the scene, and made anew only where more is wanted than it has. Its variance is kept with it: what an error owes to it is subtracted
 //! ([`crate::report::measures::Noise`]), and an error that is mostly that is said to be so.
 
 use super::contender::Stop;
@@ -10,9 +11,11 @@ use super::effort::Effort;
 use super::{Subject, size};
 use crate::io::png::PngOptions;
 use crate::io::write::{read_image, write_image};
-use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Render};
+use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Render, RenderError};
 use crate::report::Picture;
+use crate::report::coverage::Coverage;
 use crate::report::measures::relative_variance;
+use crate::scene::Scene;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -75,6 +78,9 @@ fn read(subject: &Subject<'_>, path: &Path) -> Result<Picture, String> {
 /// The one that is there, if it is as good as wanted or took as long as allowed.
 fn kept(subject: &Subject<'_>, path: &Path, effort: &Effort) -> Option<Reference> {
     let file = read_image(path).ok()?;
+    if file.attributes.get("techniques")? != &suited(subject.scene).ok()?.settings.techniques.names() {
+        return None;
+    }
     let seconds: f64 = file.attributes.get("renderTime")?.parse().ok()?;
     let picture = read(subject, path).ok()?;
     let reference = Reference::new(picture, format!("kept beside the scene, made in {seconds:.0} s"));
@@ -82,8 +88,17 @@ fn kept(subject: &Subject<'_>, path: &Path, effort: &Effort) -> Option<Reference
     enough.then_some(reference)
 }
 
+/// The most suitable estimator that does not choose by itself.
+fn suited(scene: &Scene) -> Result<Options, RenderError> {
+    let mut options = Options::for_scene(scene, Estimator::Bidirectional);
+    let blind = Coverage::of(scene).blind.iter().any(|b| b.estimator == Estimator::Bidirectional.name());
+    let merges = blind || Render::new(scene, &Options::for_scene(scene, Estimator::Auto))?.plan().settings.techniques.merge;
+    options.settings.techniques.merge = merges;
+    Ok(options)
+}
+
 fn make(subject: &Subject<'_>, path: &Path, effort: &Effort, stop: Stop<'_>) -> Result<Option<Reference>, String> {
-    let mut options = Options::for_scene(subject.scene, Estimator::Bidirectional);
+    let mut options = suited(subject.scene).map_err(|e| e.to_string())?;
     options.settings.seed = effort.seed ^ SEED;
     let begin = Instant::now();
     let mut render = Render::new(subject.scene, &options).map_err(|e| e.to_string())?;
@@ -112,12 +127,14 @@ fn make(subject: &Subject<'_>, path: &Path, effort: &Effort, stop: Stop<'_>) -> 
         ("software", format!("nephroid {}", env!("CARGO_PKG_VERSION"))),
         ("sceneHash", subject.scene.hash_hex()),
         ("estimator", Estimator::Bidirectional.name().into()),
+        ("techniques", options.settings.techniques.names()),
         ("renderTime", format!("{seconds:.3}")),
     ];
     file.attributes.extend(attributes.map(|(k, v)| (k.to_owned(), v)));
     let fault = write_image(path, &file, PngOptions::default()).err();
-    let origin =
-        format!("made in {seconds:.0} s by the bidirectional estimator, {} samples per pixel", render.statistics().passes);
+    let merges = if options.settings.techniques.merge { " with merges" } else { "" };
+    let passes = render.statistics().passes;
+    let origin = format!("made in {seconds:.0} s by the bidirectional estimator{merges}, {passes} samples per pixel");
     let mut reference = Reference::new(picture, origin);
     reference.warning = fault.map(|f| format!("the reference could not be kept: {f}"));
     Ok(Some(reference))

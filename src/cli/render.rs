@@ -11,6 +11,7 @@ use crate::io::fault::{Fault, reason};
 use crate::io::png::PngOptions;
 use crate::io::write::{write_atomic, write_image};
 use crate::render::{Budget, Control, Estimator, Options, Outcome, Progress, Render, Truncation, left_out};
+use crate::report::memory;
 use crate::scene::Scene;
 use crate::transport::class::PathFilter;
 use crate::transport::mis::Heuristic;
@@ -373,6 +374,7 @@ impl Job<'_> {
         let film = render.film();
         let set = &render.plan().settings;
         let seconds = s.time.as_secs_f64();
+        let threads = rayon::current_num_threads();
         let samples = s.passes as f64 * f64::from(film.width()) * f64::from(film.height());
         serde_json::json!({
             "version": env!("CARGO_PKG_VERSION"),
@@ -393,7 +395,7 @@ impl Job<'_> {
             "seed": set.seed,
             "width": film.width(),
             "height": film.height(),
-            "threads": rayon::current_num_threads(),
+            "threads": threads,
             "samples_per_pixel": s.passes,
             "light_paths_per_pass": render.plan().light_paths,
             "render_seconds": seconds,
@@ -405,12 +407,14 @@ impl Job<'_> {
                 "shoot": s.rays.shoot,
                 "shadow": s.rays.shadow,
                 "per_second": s.rays.total() as f64 / seconds.max(1e-9),
+                "million_per_second_and_thread": s.rays.total() as f64 * 1e-6 / seconds.max(1e-9) / threads as f64,
             },
             "gather_walks": s.rays.gather_walks,
             "shoot_walks": s.rays.shoot_walks,
             "light_vertices_of_last_pass": s.light_vertices,
             "contributions_dropped": s.dropped,
             "contributions_cut": s.cut,
+            "peak_memory_bytes": memory::peak(),
             "film_bytes": crate::film::Film::bytes(film.width(), film.height()),
             "interrupted": interrupt::asked(),
         })

@@ -12,6 +12,9 @@ use crate::spectrum::Spectrum;
 use crate::texture::{TextureSlot, Textures};
 use glam::Vec2;
 
+/// Roughness below which a model without a diffuse part scatters into few directions.
+const FOCUSED: f32 = 0.1;
+
 /// Index of a built local model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaterialId(pub u32);
@@ -75,6 +78,7 @@ pub(super) enum Side {
 struct Summary {
     lobes: Lobes,
     anisotropic: bool,
+    focused: bool,
     albedo_bound: Spectrum,
 }
 
@@ -111,6 +115,7 @@ impl Materials {
         self.summaries.push(Summary {
             lobes: models().fold(Lobes::default(), |all, m| all.union(m.lobes())),
             anisotropic: models().any(Model::is_anisotropic),
+            focused: models().all(|m| is_focused(m, textures)),
             albedo_bound: models().fold(Spectrum::BLACK, |most, m| most.lane_max(m.albedo_bound(textures))),
         });
         self.sides.extend([front, back]);
@@ -148,6 +153,13 @@ impl Materials {
         self.summaries[id.0 as usize].anisotropic
     }
 
+    /// All its events are Dirac events or nearly so: whatever arrives leaves in few directions. One answer for the
+    /// whole material, so that it belongs to the path and not to the walker that asks.
+    #[inline]
+    pub fn is_focused(&self, id: MaterialId) -> bool {
+        self.summaries[id.0 as usize].focused
+    }
+
     /// Kinds of events on either side.
     pub fn lobes(&self, id: MaterialId) -> Lobes {
         self.summaries[id.0 as usize].lobes
@@ -168,6 +180,12 @@ impl Materials {
     pub fn albedo_bound(&self, id: MaterialId) -> Spectrum {
         self.summaries[id.0 as usize].albedo_bound
     }
+}
+
+/// Told in the middle of textures.
+fn is_focused(model: &Model, textures: &Textures) -> bool {
+    let spread = model.lobes().diffuse || model.is_anisotropic();
+    !spread && model.resolve(textures, Vec2::splat(0.5)).roughness() < FOCUSED
 }
 
 impl Side {

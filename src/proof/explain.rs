@@ -3,19 +3,20 @@
 //! The pixel is sampled as a render would, and whole paths are rebuilt as they are found
 //! ([`crate::transport::reference`]). For each of the strongest the density of every join that could have made
 //! it is computed anew from its definition; the weights that follow stand beside the one that the walk used. All
-//! paths are summed up by class and join. The pixel's measurement by gathering, shooting and both tells whether
-//! they agree.
+//! paths are summed up by class and join. The pixel's measurement by gathering, shooting, both, and both with merges
+//! tells whether they agree.
 
 use crate::film::Filter;
 use crate::math::Random;
 use crate::math::random::Family;
-use crate::render::{Estimator, Measurement, Options, PixelMeasurement, Render, RenderError};
+use crate::render::{Measurement, Options, PixelMeasurement, Render, RenderError};
 use crate::scene::emitter::Emission;
 use crate::scene::{Scene, Surface};
 use crate::spectrum::Spectrum;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
 use crate::transport::reference::{JoinKey, PathVertex, Testimony, Witness, products, weights};
+use crate::transport::settings::Techniques;
 use crate::transport::shoot::shoot;
 use crate::transport::vertex::Scatter;
 use crate::transport::walk::{Context, Join, Observe, Tally};
@@ -46,14 +47,7 @@ pub struct Name {
 
 impl Name {
     fn new(technique: Technique, light_vertices: usize) -> Self {
-        let technique = match technique {
-            Technique::Hit => "hit",
-            Technique::NextEvent => "nee",
-            Technique::Connect => "connect",
-            Technique::Splat => "splat",
-            Technique::Merge => "merge",
-        };
-        Self { technique, light_vertices }
+        Self { technique: technique.name(), light_vertices }
     }
 }
 
@@ -133,6 +127,8 @@ pub struct Explanation {
     pub shoot: Measurement,
     /// Both, weighted.
     pub bidirectional: Measurement,
+    /// Both, with merges where mirrors and glass hide the light from every other join.
+    pub merging: Measurement,
     /// By class and join, strongest first.
     pub shares: Vec<Share>,
     /// Strongest first.
@@ -147,25 +143,29 @@ pub fn explain(scene: &Scene, options: &Options, (x, y): (u32, u32), effort: Eff
     options.settings.stratified = false;
     let measured = PixelMeasurement::new(scene, &options, (x, y), samples)?;
     options.crop = Some([x, y, 1, 1]);
-    options.settings.techniques = Estimator::Bidirectional.techniques();
+    options.settings.techniques = Techniques::ALL;
     options.settings.light_paths.get_or_insert(1024);
     let render = Render::new(scene, &options)?;
     let filter = Filter::new(scene.film.filter).ok_or(RenderError::Filter)?;
-    let mut found = Found { keep: effort.paths, strongest: Vec::new(), shares: BTreeMap::new(), samples: samples as f64 };
+    let mut found =
+        Found { keep: effort.paths, strongest: Vec::new(), pass: 0, shares: BTreeMap::new(), samples: samples as f64 };
     for pass in 0..samples {
+        found.pass = pass;
         search(Context::new(scene, render.plan(), pass), &filter, (x, y), pass, &mut found);
     }
     found.trim();
-    let cx = Context::new(scene, render.plan(), 0);
-    let pixel = measured.bidirectional.mean.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
+    let pixel = measured.merging.mean.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
     let per = |value: f64| if pixel > 0.0 { value / pixel } else { 0.0 };
-    let paths = found.strongest.iter().map(|(value, t)| strong(cx, *value * (1.0 / samples as f32), t, per)).collect();
+    let of = |(value, t, pass): &(Spectrum, Testimony, u64)| {
+        strong(Context::new(scene, render.plan(), *pass), *value * (1.0 / samples as f32), t, per)
+    };
+    let paths = found.strongest.iter().map(of).collect();
     let share =
         |((class, by), (value, found)): ((String, Name), (f64, u64))| Share { class, by, value, share: per(value), found };
     let mut shares: Vec<Share> = found.shares.into_iter().map(share).collect();
     shares.sort_by(|a, b| b.value.total_cmp(&a.value));
-    let PixelMeasurement { gather, shoot, bidirectional } = measured;
-    Ok(Explanation { pixel: [x, y], samples, gather, shoot, bidirectional, shares, paths })
+    let PixelMeasurement { gather, shoot, bidirectional, merging } = measured;
+    Ok(Explanation { pixel: [x, y], samples, gather, shoot, bidirectional, merging, shares, paths })
 }
 
 /// One sample of the pixel with its light paths.
@@ -249,7 +249,9 @@ impl Observe for Watch<'_> {
 /// What was found so far.
 struct Found {
     keep: usize,
-    strongest: Vec<(Spectrum, Testimony)>,
+    /// With the pass that found them, whose radius of merges its weights have.
+    strongest: Vec<(Spectrum, Testimony, u64)>,
+    pass: u64,
     shares: BTreeMap<(String, Name), (f64, u64)>,
     samples: f64,
 }
@@ -263,7 +265,7 @@ impl Found {
 
     fn path(&mut self, value: Spectrum, testimony: Testimony) {
         self.add(class(&testimony), Name::new(testimony.key.0, testimony.key.1), value);
-        self.strongest.push((value, testimony));
+        self.strongest.push((value, testimony, self.pass));
         if self.strongest.len() >= 2 * self.keep + 64 {
             self.trim();
         }
@@ -322,7 +324,13 @@ impl Explanation {
         let mut out = String::new();
         let [x, y] = self.pixel;
         let _ = writeln!(out, "pixel {x},{y}, {} samples each: red, green, blue ± standard error", self.samples);
-        for (name, m) in [("gather", &self.gather), ("shoot", &self.shoot), ("bidirectional", &self.bidirectional)] {
+        let measurements = [
+            ("gather", &self.gather),
+            ("shoot", &self.shoot),
+            ("bidirectional", &self.bidirectional),
+            ("with merges", &self.merging),
+        ];
+        for (name, m) in measurements {
             let _ = writeln!(out, "  {name:13} {}", measurement(m));
         }
         out.push_str("by class and join\n");

@@ -2,6 +2,7 @@
 
 use super::{Budget, Control, Estimator, Options, Render, RenderError};
 use crate::scene::Scene;
+use crate::transport::settings::Techniques;
 
 /// Light paths per sample of a single pixel, unless the settings say otherwise.
 const LIGHT_PATHS: u32 = 1024;
@@ -26,14 +27,21 @@ pub struct PixelMeasurement {
     pub shoot: Measurement,
     /// Both, weighted.
     pub bidirectional: Measurement,
+    /// Both, with merges where mirrors and glass hide the light from every other join: consistent.
+    pub merging: Measurement,
 }
 
 impl PixelMeasurement {
     /// Measures pixel (x, y) of the whole film with `samples` samples per strategy. What a walker
     /// cannot see is missing from its measurement, as it is from its image.
     pub fn new(scene: &Scene, options: &Options, (x, y): (u32, u32), samples: u64) -> Result<Self, RenderError> {
-        let by = |e: Estimator| measure(scene, options, e, (x, y), samples);
-        Ok(Self { gather: by(Estimator::Gather)?, shoot: by(Estimator::Shoot)?, bidirectional: by(Estimator::Bidirectional)? })
+        let by = |t: Techniques| measure_by(scene, options, t, (x, y), samples);
+        Ok(Self {
+            gather: by(Techniques::GATHER)?,
+            shoot: by(Techniques::SHOOT)?,
+            bidirectional: by(Techniques::BIDIRECTIONAL)?,
+            merging: by(Techniques::ALL)?,
+        })
     }
 }
 
@@ -42,6 +50,16 @@ pub fn measure(
     scene: &Scene,
     options: &Options,
     estimator: Estimator,
+    pixel: (u32, u32),
+    samples: u64,
+) -> Result<Measurement, RenderError> {
+    measure_by(scene, options, estimator.techniques(), pixel, samples)
+}
+
+fn measure_by(
+    scene: &Scene,
+    options: &Options,
+    techniques: Techniques,
     (x, y): (u32, u32),
     samples: u64,
 ) -> Result<Measurement, RenderError> {
@@ -51,7 +69,7 @@ pub fn measure(
     }
     let mut options = options.clone();
     options.crop = Some([x, y, 1, 1]);
-    options.settings.techniques = estimator.techniques();
+    options.settings.techniques = techniques;
     options.settings.light_paths.get_or_insert(LIGHT_PATHS);
     let mut render = Render::new(scene, &options)?;
     render.run(&Budget::passes(samples.max(2)), |_| Control::Continue);

@@ -2,6 +2,7 @@
 //! and what an estimator misses.
 //!
 //! - [`agreement`]: whether estimators agree, block by block, over independent renders.
+//! - [`memory`]: what this process holds.
 //! - [`measures`]: RMSE, relMSE plain and trimmed, ratio of means.
 //! - [`flip`]: what an eye flipping between the two would see.
 //! - [`welch`]: whether two estimates with known variance have the same expectation.
@@ -16,6 +17,7 @@ pub mod comparison;
 pub mod coverage;
 pub mod flip;
 pub mod measures;
+pub mod memory;
 pub mod picture;
 pub mod pyramid;
 pub mod sheet;

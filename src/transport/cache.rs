@@ -28,7 +28,7 @@ pub struct LightVertex {
     pub emitter: EmitterId,
     /// It cannot be hit.
     pub light_delta: bool,
-    /// Reached by a Dirac event: merges may end here.
+    /// Reached by a focused event, and none itself: merges may end here.
     pub merges: bool,
 }
 

@@ -60,6 +60,7 @@ pub fn follow<R: Record, O: Observe>(
         k: 0.0,
         p: if p_sensor > 0.0 { p_sensor } else { 1.0 },
         delta: false,
+        focused: false,
         may_merge: false,
         from: start.lens,
         cos_from: 1.0,
@@ -93,7 +94,7 @@ pub fn follow<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let partial = walk.partial(plan.settings.heuristic, arrival, count);
+        let partial = walk.partial(cx, arrival, vertex.focused, count);
         if !vertex.closure.is_delta() {
             if plan.settings.techniques.next_event {
                 next_event(cx, &walk, &vertex, partial, random, tally);
@@ -101,7 +102,7 @@ pub fn follow<R: Record, O: Observe>(
             if plan.c > 0.0 {
                 connect(cx, &walk, &vertex, partial, lights, random, tally);
             }
-            if walk.delta && cx.merge_radius2 > 0.0 {
+            if walk.focused && !vertex.focused && cx.merge_radius2 > 0.0 {
                 merge(cx, &walk, &vertex, partial, lights, tally);
             }
         }
@@ -312,13 +313,17 @@ fn connect<R: Record, O: Observe>(
         let light = Vertex::new(scene, y.surface, y.w_back);
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
+        // A merge at either end exists only where the other end is focused.
+        let merged = |possible: bool| if possible { h.raise(cx.eta) } else { 0.0 };
+        let at_eye = merged(walk.focused && !vertex.focused && light.focused);
+        let at_light = merged(y.merges && vertex.focused);
         let weight = mis::connect(
             h,
             plan.c,
             k_light.p_w * k_eye.cos_g * inv_d2,
-            partial.at(h, k_eye.p_w_rev),
+            partial.at(h, k_eye.p_w_rev) + at_eye,
             k_eye.p_w * k_light.cos_g * inv_d2,
-            y.partial.at(h, k_light.p_w_rev),
+            y.partial.at(h, k_light.p_w_rev) + at_light,
         );
         let value = walk.throughput * k_eye.value * y.throughput * k_light.value * (inv_d2 * inv_prob * weight);
         if value.is_black() {
@@ -368,7 +373,7 @@ fn meet<R: Record, O: Observe>(
     finish(cx, path, value, join, y.length + 1, tally);
 }
 
-/// Merges `vertex`, reached by a Dirac event, with the light vertices around it that were so as well.
+/// Merges `vertex`, reached by a focused event, with the light vertices around it that were so as well.
 fn merge<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,

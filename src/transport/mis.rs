@@ -19,9 +19,10 @@
 //!
 //! A *merge* at v_i counts a shooting vertex within a radius r as the same vertex: its density is
 //! η G_i S_i with η = Nπr², so 1 over its weight is 1 + (K_i + H_i)/η [Georgiev 2012; Hachisuka
-//! 2012]. Merges are made only between two Dirac events, where hardly any other join finds anything;
-//! that is a property of the path, so weights remain a partition. A walker learns at the Dirac event
-//! after v_i that the merge at v_i exists, and adds its term there ([`Partial::and_merge`]).
+//! 2012]. Merges are made only between two focused events (Dirac events, or of a material that is nearly a mirror or
+//! clear glass), where hardly any other join finds anything; that is a property of the path, so weights remain a
+//! partition. A walker learns at the event after v_i that the merge at v_i exists, and adds its term there
+//! ([`Partial::and_merge`]).
 //!
 //! The power heuristic (exponent 2) is the same recursion with every density and count squared.
 

@@ -63,6 +63,8 @@ pub struct Densities {
     pub nu: f64,
     /// Which of v_1 … v_{k−1} are Dirac events (index as in `g`).
     pub delta: Vec<bool>,
+    /// Which are that or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
+    pub focused: Vec<bool>,
 }
 
 /// A join and the number of vertices that shooting made.
@@ -81,7 +83,8 @@ impl Path {
     pub fn densities(&self, scene: &Scene, plan: &Plan) -> Densities {
         let k = self.edges();
         let m = self.vertices.len();
-        let mut d = Densities { g: vec![0.0; k + 1], s: vec![0.0; k + 1], nu: 0.0, delta: vec![false; k + 1] };
+        let no = vec![false; k + 1];
+        let mut d = Densities { g: vec![0.0; k + 1], s: vec![0.0; k + 1], nu: 0.0, delta: no.clone(), focused: no };
         let to_light = self.direction_to_light(scene, self.vertices[m - 1].surface.p);
         let first = self.vertices[0].surface;
         let w = (first.p - self.lens).normalize();
@@ -105,6 +108,7 @@ impl Path {
                 }
             };
             d.delta[i + 1] = v.dirac.is_some();
+            d.focused[i + 1] = v.dirac.is_some() || scene.materials.is_focused(v.surface.material);
             if i + 1 < m {
                 d.g[i + 2] = p_gather * jacobian(p, &self.vertices[i + 1].surface);
             } else if !self.light_delta {
@@ -186,9 +190,9 @@ pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     joins
 }
 
-/// Whether v_i can be a merged vertex: between two Dirac events.
+/// Whether v_i can be a merged vertex: between two focused events, and none itself.
 fn merges_at(d: &Densities, i: usize, eta: f64) -> bool {
-    eta > 0.0 && d.delta[i - 1] && !d.delta[i] && d.delta[i + 1]
+    eta > 0.0 && d.focused[i - 1] && !d.focused[i] && d.focused[i + 1]
 }
 
 /// The same weights by the recursion of [`mis`], on numbers instead of walks.
@@ -250,7 +254,9 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKe
     if plan.c > 0.0 {
         for i in 1..k.saturating_sub(1) {
             if !d.delta[i] && !d.delta[i + 1] {
-                let w = mis::connect(h, c, d.s[i], k_at(i), d.g[i + 1], h_at(i + 1));
+                let merged = |i: usize| if i > 1 && i + 1 < k && merges_at(d, i, eta) { h.raise(eta) } else { 0.0 };
+                let (k_i, h_next) = (k_at(i) + merged(i), h_at(i + 1) + merged(i + 1));
+                let w = mis::connect(h, c, d.s[i], k_i, d.g[i + 1], h_next);
                 joins.push(((Technique::Connect, k - i), w));
             }
         }

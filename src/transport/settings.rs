@@ -17,7 +17,7 @@ pub struct Techniques {
     pub splat: bool,
     /// Gathering vertices are joined to shooting vertices.
     pub connect: bool,
-    /// Gathering vertices between Dirac events are merged with shooting vertices near them: biased by
+    /// Gathering vertices between focused events (Dirac or nearly so) are merged with shooting vertices near them: biased by
     /// a radius that shrinks from pass to pass, so consistent.
     pub merge: bool,
 }

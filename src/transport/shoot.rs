@@ -62,6 +62,7 @@ pub fn emit<R: Record, O: Observe>(
         k: if hits { 1.0 / h.raise(d.p_k) } else { 0.0 },
         p: d.p_next,
         delta: false,
+        focused: false,
         may_merge: false,
         from: start.point.y,
         cos_from,
@@ -93,14 +94,15 @@ pub fn emit<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let partial = walk.partial(h, arrival, count);
+        let partial = walk.partial(cx, arrival, vertex.focused, count);
+        let merges = walk.focused && !vertex.focused;
         if !vertex.closure.is_delta() {
             if plan.settings.techniques.splat && (length > 1 || plan.splat_direct) {
                 splat(cx, &walk, &vertex, partial, start, random, tally);
             }
             if let Some(cache) = cache.as_mut()
                 && length + 2 <= plan.settings.max_length
-                && (plan.settings.techniques.connect || walk.delta)
+                && (plan.settings.techniques.connect || merges)
             {
                 cache.push(LightVertex {
                     surface,
@@ -112,7 +114,7 @@ pub fn emit<R: Record, O: Observe>(
                     first_delta: walk.first_delta,
                     emitter: start.point.emitter,
                     light_delta: start.delta,
-                    merges: walk.delta,
+                    merges,
                 });
                 if let Some(v) = cache.last() {
                     tally.observe.cached(v);

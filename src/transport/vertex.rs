@@ -30,6 +30,8 @@ pub struct Vertex<'a> {
     pub back: Vec3,
     /// `w_back · n_g`, signed.
     pub cos_g_back: f32,
+    /// All its events are [focused](crate::local::Materials::is_focused).
+    pub focused: bool,
 }
 
 /// The kernel towards one direction, with what the weights need.
@@ -60,6 +62,8 @@ pub struct Scatter {
     pub cos_g: f32,
     /// A Dirac event.
     pub delta: bool,
+    /// That, or nearly so: the material is [focused](crate::local::Materials::is_focused).
+    pub focused: bool,
     /// Ratio of the Dirac functions, see [`crate::local::Sample::dirac_ratio`].
     pub dirac_ratio: f32,
     /// Refractive index on the side of `w_next` over that on the side of `w_back`.
@@ -77,7 +81,8 @@ impl<'a> Vertex<'a> {
         };
         let back = frame.to_local(w_back);
         let closure = scene.materials.resolve(surface.material, surface.uv, back.z > 0.0);
-        Self { surface, frame, closure, w_back, back, cos_g_back: w_back.dot(surface.n_g) }
+        let focused = scene.materials.is_focused(surface.material);
+        Self { surface, frame, closure, w_back, back, cos_g_back: w_back.dot(surface.n_g), focused }
     }
 
     /// Whether shading and geometric normal agree about the sides of both directions.
@@ -152,6 +157,7 @@ impl<'a> Vertex<'a> {
             p_rev: s.p_rev,
             cos_g: cos_g.abs(),
             delta: s.delta,
+            focused: s.delta || self.focused,
             dirac_ratio: s.dirac_ratio,
             eta: s.eta,
         })

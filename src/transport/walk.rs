@@ -6,7 +6,7 @@
 
 use super::cache::LightVertex;
 use super::class::{PathFilter, Positions, Symbol};
-use super::mis::{Heuristic, Partial};
+use super::mis::Partial;
 use super::mutant::{Mutant, planted};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
@@ -53,7 +53,9 @@ pub struct Walk {
     pub p: f32,
     /// The vertex that was left scattered by a Dirac event.
     pub delta: bool,
-    /// It did not, but the one before it did: a merge is possible there if the next event is a Dirac event.
+    /// It did, or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
+    pub focused: bool,
+    /// It did not, but the one before it did: a merge is possible there if the next event is focused.
     pub may_merge: bool,
     /// Position of the vertex that was left.
     pub from: Vec3,
@@ -93,10 +95,22 @@ impl Walk {
         Arrival { inv_d2, p_a }
     }
 
-    /// MIS sum of the vertex arrived at; `count` joins could have made the edge.
+    /// MIS sum of the vertex arrived at, of a material that is `focused` or not; `count` joins could have made
+    /// the edge.
     #[inline]
-    pub fn partial(&self, h: Heuristic, arrival: Arrival, count: f32) -> Partial<f32> {
-        Partial::arrive(h, count, arrival.p_a, self.cos_from * arrival.inv_d2, self.k)
+    pub fn partial(&self, cx: Context<'_>, arrival: Arrival, focused: bool, count: f32) -> Partial<f32> {
+        let h = cx.plan.settings.heuristic;
+        let partial = Partial::arrive(h, count, arrival.p_a, self.cos_from * arrival.inv_d2, self.k);
+        if focused { self.with_merge(cx, arrival, partial) } else { partial }
+    }
+
+    /// Adds the merge at the vertex before, where there is one once the event here is known to be focused.
+    #[inline]
+    fn with_merge(&self, cx: Context<'_>, arrival: Arrival, partial: Partial<f32>) -> Partial<f32> {
+        if !self.may_merge || planted(Mutant::MergeWeight) {
+            return partial;
+        }
+        partial.and_merge(cx.plan.settings.heuristic, cx.eta, arrival.p_a, self.cos_from * arrival.inv_d2)
     }
 
     /// Leaves `vertex` along a sampled direction.
@@ -105,14 +119,16 @@ impl Walk {
         let h = cx.plan.settings.heuristic;
         self.throughput *= s.weight;
         self.k = if s.delta {
-            if self.may_merge && !planted(Mutant::MergeWeight) {
-                partial = partial.and_merge(h, cx.eta, arrival.p_a, self.cos_from * arrival.inv_d2);
+            // Where all events are focused, it was added on arrival.
+            if !vertex.focused {
+                partial = self.with_merge(cx, arrival, partial);
             }
             partial.at_delta(h, s.p_rev, s.dirac_ratio)
         } else {
             partial.at(h, s.p_rev)
         };
-        self.may_merge = self.delta && !s.delta;
+        self.may_merge = self.focused && !s.focused;
+        self.focused = s.focused;
         self.p = s.p;
         self.delta = s.delta;
         self.from = vertex.surface.p;

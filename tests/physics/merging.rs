@@ -23,8 +23,7 @@ fn merges_find_what_hits_find() {
     let dir = tempfile::tempdir().unwrap();
     let world = scene(&scenes::named(dir.path(), "glass and mirror"));
     let effort = Effort { renders: 40, passes: 6, max_length: 6 };
-    let paths = "E .* S D S+ L";
-    let of = |techniques, add| series(&world, &settings(techniques, paths, 0.02, add), effort);
+    let of = |techniques, add| series(&world, &settings(techniques, "E .* S D S+ L", 0.02, add), effort);
     let (merged, hit, both) = (of("merge", 0), of("hit", 1), of("hit,merge", 2));
     let mut energy = 0.0;
     for k in 4..=effort.max_length as usize {
@@ -35,6 +34,20 @@ fn merges_find_what_hits_find() {
         }
     }
     assert!(energy > 0.0);
+}
+
+#[test]
+fn merges_between_events_that_are_nearly_mirrors_count_once() {
+    // There no expression tells which paths can be merged: weights alone see to it that none counts twice.
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), "nearly specular"));
+    let effort = Effort { renders: 40, passes: 6, max_length: 5 };
+    let of = |techniques, add| series(&world, &settings(techniques, "", 0.01, add), effort);
+    let (hit, all) = (of("hit,nee,splat", 3), of("hit,nee,splat,merge", 4));
+    for k in 2..=effort.max_length as usize {
+        let v = agreement(&hit[k], &all[k]);
+        assert!(v.p > 1e-5, "length {k}: {:.4e} without merges, {:.4e} with, p = {:.1e}", v.totals.0, v.totals.1, v.p);
+    }
 }
 
 #[test]

@@ -58,6 +58,13 @@ const ROUGH_GLASS: &str = r#"
 <shape type="cube"><transform name="to_world"><scale value="0.28"/><rotate y="1" angle="20"/><translate x="-0.5" y="-0.7" z="0"/></transform>
   <bsdf type="roughconductor"><string name="distribution" value="ggx"/><float name="alpha_u" value="0.2"/><float name="alpha_v" value="0.5"/><rgb name="eta" value="0.2, 0.9, 1.1"/><rgb name="k" value="3.9, 2.4, 2.1"/></bsdf></shape>"#;
 
+/// Not one Dirac event, and yet hardly another join than a merge finds the lamp in the mirror.
+const NEARLY_SPECULAR: &str = r#"
+<shape type="sphere"><point name="center" value="0.4, -0.5, 0.1"/><float name="radius" value="0.4"/>
+  <bsdf type="roughdielectric"><float name="alpha" value="0.06"/><float name="int_ior" value="1.5"/></bsdf></shape>
+<shape type="sphere"><point name="center" value="-0.45, -0.5, -0.3"/><float name="radius" value="0.45"/>
+  <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.08"/></bsdf></shape>"#;
+
 const PLASTICS: &str = r#"
 <shape type="sphere"><point name="center" value="0.4, -0.55, 0.2"/><float name="radius" value="0.42"/><bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.1, 0.3, 0.6"/><boolean name="nonlinear" value="true"/></bsdf></shape>
 <shape type="sphere"><point name="center" value="-0.45, -0.5, -0.2"/><float name="radius" value="0.45"/><bsdf type="roughplastic"><float name="alpha" value="0.2"/><rgb name="diffuse_reflectance" value="0.6, 0.3, 0.1"/></bsdf></shape>
@@ -134,6 +141,7 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
         scene("diffuse box", CAMERA, FILM, &[CEILING, AREA, BLOCK]),
         scene("glass and mirror", CAMERA, FILM, &[CEILING, AREA, GLASS_AND_MIRROR]),
         scene("rough glass and metal", CAMERA, FILM, &[CEILING, AREA, ROUGH_GLASS]),
+        scene("nearly specular", CAMERA, FILM, &[CEILING, AREA, NEARLY_SPECULAR]),
         scene("plastics, mask and blend", CAMERA, FILM, &[CEILING, AREA, PLASTICS]),
         scene("shading normals", CAMERA, FILM, &[CEILING, AREA, &coarse]),
         scene("point light", CAMERA, FILM, &[CEILING, point, GLASS_AND_MIRROR]),

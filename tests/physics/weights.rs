@@ -23,6 +23,7 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
     let s: Vec<f64> = (0..=k).map(|_| density()).collect();
     let nu = density();
     let delta: Vec<bool> = (0..=k).map(|i| i > 0 && i < k && random.unit() < 0.35).collect();
+    let focused = (0..=k).map(|i| delta[i] || (i > 0 && i < k && random.unit() < 0.3)).collect();
     if random.unit() < 0.3 {
         g[k] = 0.0;
     }
@@ -38,7 +39,7 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
     let merge_radius = Some((random.unit() * 4.0 - 4.0).exp());
     let settings = Settings { techniques, heuristic, connections, merge_radius, ..Settings::default() };
     let vertices = 0.5 + 3.0 * f64::from(random.unit());
-    (Densities { g, s, nu, delta }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
+    (Densities { g, s, nu, delta, focused }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
 }
 
 #[test]

@@ -5,6 +5,9 @@ mod adjoint;
 mod caustics;
 mod cli;
 mod explain;
+#[path = "../physics/mirrors.rs"]
+#[allow(dead_code)]
+mod mirrors;
 mod residual;
 #[path = "../physics/scenes.rs"]
 #[allow(dead_code)]

@@ -189,7 +189,7 @@ struct Footprints {
     /// Pixels per steradian, or per area where rays are parallel.
     density: f32,
     parallel: bool,
-    after_dirac: bool,
+    after_focused: bool,
     found: Vec<f32>,
 }
 impl Observe for Footprints {
@@ -205,16 +205,16 @@ impl Observe for Footprints {
     fn arrived(&mut self, surface: &crate::scene::Surface) {
         self.distance += surface.p.distance(self.last);
         self.last = surface.p;
-        if self.after_dirac {
+        if self.after_focused {
             let spread = if self.parallel { 1.0 } else { self.distance * self.distance };
             self.found.push(spread / self.density);
         }
     }
     fn scattered(&mut self, s: &crate::transport::vertex::Scatter) {
-        if s.delta && self.after_dirac {
+        if s.focused && self.after_focused {
             self.found.pop();
         }
-        self.after_dirac = s.delta;
+        self.after_focused = s.focused;
     }
 }
 
