@@ -158,12 +158,12 @@ fn planted_mistakes_part_the_walkers() {
         (Mutant::RouletteFactor, "diffuse box", 24),
         (Mutant::AreaCosine, "diffuse box", 2),
     ] {
-        let world = scene(&scenes::named(dir.path(), name));
+        let mut world = scene(&scenes::named(dir.path(), name));
         let max_length = Some(if mutant == Mutant::RouletteFactor { 9 } else { 5 });
         let draws = Draws { passes: Some(passes), seed: seed(), max_length, ..Draws::default() };
         let [sound, mistaken] = [None, Some(mutant)].map(|m| {
             plant(m);
-            let found = adjoint(&world, &draws).unwrap();
+            let found = adjoint(&mut world, &draws).unwrap();
             plant(None);
             found
         });

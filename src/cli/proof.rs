@@ -16,7 +16,7 @@ const SIDE: u32 = 96;
 
 /// Prints both sides of every n.
 pub fn adjoint(args: &AdjointArgs) -> Result<Exit, Failure> {
-    let opened = opened(&args.scene, args.size)?;
+    let mut opened = opened(&args.scene, args.size)?;
     let effort = Effort {
         renders: args.effort.renders as usize,
         passes: args.effort.passes,
@@ -25,7 +25,7 @@ pub fn adjoint(args: &AdjointArgs) -> Result<Exit, Failure> {
         max_length: args.max_length,
         paths: args.paths.clone(),
     };
-    let found = adjoint::adjoint(&opened.scene, &effort).map_err(|e| Failure::usage(e.to_string()))?;
+    let found = adjoint::adjoint(&mut opened.scene, &effort).map_err(|e| Failure::usage(e.to_string()))?;
     print(&args.effort, &found, found.to_text(args.classes, args.blocks));
     Ok(verdict(found.agree))
 }

@@ -10,14 +10,17 @@
 //! [Šidák 1967]. Paths that a walker finds by luck are compared apart from those it always finds
 //! ([`super::blocks`]), so that what is rarely found is not taken for what is never found. A mean of few effective draws is not tested: either side gets more passes until
 //! nearly all energy can be, or the time is over; the share that was is part of the verdict. Classes of
-//! next to no energy are not tested: what has not been found yet may be as large as what has.
+//! next to no energy are not tested: what has not been found yet may be as large as what has. For the same
+//! reason each light is tested on its own: a sky is gathered always and a small sun by luck, for shooting it
+//! is the other way round, and their sum would hide both.
 
 use super::blocks::{self, Series};
 use super::compare::{Estimate, compare, sides_text, worst};
 use crate::render::{Estimator, Options, RenderError};
 use crate::report::agreement::{Agreement, BlockSeries, agreement};
 use crate::report::coverage::{Blind, Coverage};
-use crate::scene::Scene;
+use crate::scene::emitter::{EmitterInfo, Lights};
+use crate::scene::{EmitterId, Scene};
 use crate::transport::class::PathFilter;
 use std::fmt::Write;
 use std::time::{Duration, Instant};
@@ -32,6 +35,8 @@ const FAINT: f64 = 1e-3;
 const NOTHING: f64 = 2e-4;
 /// Passes per draw to begin with: rare paths must have had a chance.
 const FIRST: u64 = 8;
+/// Emitters that are tested apart, at most; the weakest together.
+const GROUPS: usize = 4;
 /// Longest paths where neither scene nor caller says.
 const LONGEST: u32 = 16;
 
@@ -94,6 +99,19 @@ pub struct Term {
     pub classes: Vec<Class>,
 }
 
+/// The lights of a scene that are on together, and every n by their light alone.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Lit {
+    /// Their kinds and names.
+    pub lights: String,
+    /// Passes per draw by gathering and by shooting.
+    pub passes: [u64; 2],
+    /// n = 0, 1, …
+    pub terms: Vec<Term>,
+    /// Corrected over all lengths.
+    pub p: f64,
+}
+
 /// The verdict.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Adjoint {
@@ -101,28 +119,62 @@ pub struct Adjoint {
     pub size: [u32; 2],
     /// Draws of each side.
     pub renders: usize,
-    /// Passes per draw by gathering and by shooting.
-    pub passes: [u64; 2],
-    /// n = 0, 1, …
-    pub terms: Vec<Term>,
+    /// Light by light.
+    pub lit: Vec<Lit>,
     /// Classes that one side cannot make.
     pub left_out: Vec<Blind>,
     /// Share of the energy of the classes both can make that was tested.
     pub energy_tested: f64,
-    /// Corrected over all lengths.
+    /// Corrected over all lengths and lights.
     pub p: f64,
     /// p is at least [`ALPHA`].
     pub agree: bool,
 }
 
-/// Both sides of every n, compared.
-pub fn adjoint(scene: &Scene, effort: &Effort) -> Result<Adjoint, Refused> {
-    let coverage = Coverage::of(scene);
-    let left_out: Vec<Blind> = coverage.blind.into_iter().filter(|b| b.estimator != "bidirectional").collect();
+/// Both sides of every n, compared. The lights of the scene are put on one after another meanwhile.
+pub fn adjoint(scene: &mut Scene, effort: &Effort) -> Result<Adjoint, Refused> {
+    let film = &scene.film;
+    let size = film.crop.map_or([film.width, film.height], |c| [c[2], c[3]]);
+    let left_out = left_out(scene);
+    let all = scene.lights.clone();
+    let groups = all.groups(GROUPS);
+    let effort =
+        Effort { renders: effort.renders.max(2), time: effort.time.map(|t| t / groups.len().max(1) as u32), ..effort.clone() };
+    let lit: Result<Vec<Lit>, Refused> = groups
+        .iter()
+        .map(|group| {
+            scene.lights = all.only(group);
+            lit(scene, names(&all, group), &effort)
+        })
+        .collect();
+    scene.lights = all;
+    let lit = lit?;
+    let p = worst(&lit.iter().map(|l| l.p).collect::<Vec<_>>());
+    let energy_tested = share(lit.iter().flat_map(|l| &l.terms).flat_map(|t| &t.classes));
+    Ok(Adjoint { size, renders: effort.renders, lit, left_out, energy_tested, p, agree: p >= ALPHA })
+}
+
+/// Emitters as people know them.
+fn names(lights: &Lights, group: &[EmitterId]) -> String {
+    let infos = group.iter().filter_map(|id| lights.infos().get(id.0 as usize));
+    let name = |e: &EmitterInfo| e.id.as_ref().map_or(e.kind.to_owned(), |id| format!("{} `{id}`", e.kind));
+    match group.len() {
+        0..=3 => infos.map(name).collect::<Vec<_>>().join(", "),
+        n => format!("{n} emitters"),
+    }
+}
+
+/// What one of the walkers cannot make.
+fn left_out(scene: &Scene) -> Vec<Blind> {
+    Coverage::of(scene).blind.into_iter().filter(|b| matches!(b.estimator, "gather" | "shoot")).collect()
+}
+
+/// Both sides of every n by the lights that are on.
+fn lit(scene: &Scene, lights: String, effort: &Effort) -> Result<Lit, Refused> {
     let mut s = Options::for_scene(scene, Estimator::Gather).settings;
     s.max_length = effort.max_length.or(scene.integrator.max_depth).unwrap_or(LONGEST).min(1000);
     // Parallel projection sees no sky by splats, and a splat has no class finer than its events.
-    s.min_length = if left_out.iter().any(|b| b.paths == "E L") { 2 } else { 1 };
+    s.min_length = if left_out(scene).iter().any(|b| b.paths == "E L") { 2 } else { 1 };
     let asked = effort.paths.as_deref().map_or(String::new(), |p| format!("{p} & "));
     s.paths = PathFilter::parse(&format!("{asked}visible-to:gather,shoot")).map_err(Refused::Paths)?;
     let longest = s.max_length as usize;
@@ -132,7 +184,7 @@ pub fn adjoint(scene: &Scene, effort: &Effort) -> Result<Adjoint, Refused> {
         settings.techniques = estimator.techniques();
         // Families of random numbers differ, but so that nothing hangs on that, so do the seeds.
         settings.seed = effort.seed.wrapping_mul(2).wrapping_add(i as u64);
-        sides.push(Series::new(scene, &settings, effort.renders.max(2))?);
+        sides.push(Series::new(scene, &settings, effort.renders)?);
     }
     let first = s.min_length.max(1) as usize;
     draw(&mut sides, effort, first..longest + 1);
@@ -140,19 +192,7 @@ pub fn adjoint(scene: &Scene, effort: &Effort) -> Result<Adjoint, Refused> {
     let energy: f64 = classes().map(|c| sides.iter().map(|s| Estimate::of(&s.of(c)).mean).fold(0.0, f64::max)).sum();
     let terms: Vec<Term> = (first..=longest).map(|k| term(k, &sides, NOTHING * energy)).collect();
     let tests: Vec<f64> = terms.iter().flat_map(|t| &t.classes).filter(|c| c.tests() > 0).map(|c| c.p).collect();
-    let p = worst(&tests);
-    let film = &scene.film;
-    let size = film.crop.map_or([film.width, film.height], |c| [c[2], c[3]]);
-    Ok(Adjoint {
-        size,
-        renders: effort.renders.max(2),
-        passes: [sides[0].passes(), sides[1].passes()],
-        energy_tested: share(terms.iter().flat_map(|t| &t.classes)),
-        terms,
-        left_out,
-        p,
-        agree: p >= ALPHA,
-    })
+    Ok(Lit { lights, passes: [sides[0].passes(), sides[1].passes()], terms, p: worst(&tests) })
 }
 
 /// Why there is no verdict.
@@ -285,20 +325,10 @@ impl Class {
     }
 }
 
-impl Adjoint {
-    /// For people; with every class where `classes`, with every block's test where `blocks`.
-    pub fn to_text(&self, classes: bool, blocks: bool) -> String {
-        let mut out = String::new();
-        let [w, h] = self.size;
+impl Lit {
+    fn to_text(&self, classes: bool, blocks: bool) -> String {
         let [g, s] = self.passes;
-        let _ = writeln!(
-            out,
-            "{w} × {h} pixels, {} draws of {g} passes by gathering and {s} by shooting, mean radiance of the film",
-            self.renders
-        );
-        for b in &self.left_out {
-            let _ = writeln!(out, "left out: {} ({} cannot make it: {})", b.paths, b.estimator, b.what);
-        }
+        let mut out = format!("light from {}: {g} passes by gathering and {s} by shooting\n", self.lights);
         out.push_str("  n             gather ± SE              shoot ± SE                  z        p   tests  energy tested\n");
         for t in &self.terms {
             let tests: usize = t.classes.iter().map(Class::tests).sum();
@@ -308,12 +338,25 @@ impl Adjoint {
                 t.classes.iter().for_each(|c| out.push_str(&c.to_text(blocks)));
             }
         }
+        out
+    }
+}
+
+impl Adjoint {
+    /// For people; with every class where `classes`, with every block's test where `blocks`.
+    pub fn to_text(&self, classes: bool, blocks: bool) -> String {
+        let mut out = String::new();
+        let [w, h] = self.size;
+        let _ = writeln!(out, "{w} × {h} pixels, {} draws of each side, mean radiance of the film", self.renders);
+        for b in &self.left_out {
+            let _ = writeln!(out, "left out: {} ({} cannot make it: {})", b.paths, b.estimator, b.what);
+        }
+        self.lit.iter().for_each(|l| out.push_str(&l.to_text(classes, blocks)));
         let verdict = if self.agree { "both walkers agree" } else { "THE WALKERS DISAGREE" };
         let _ = writeln!(
             out,
-            "{verdict}: p = {:.2e} over {} lengths, {:.1} % of the energy that both can make tested",
+            "{verdict}: p = {:.2e} over all lengths and lights, {:.1} % of the energy that both can make tested",
             self.p,
-            self.terms.len(),
             100.0 * self.energy_tested
         );
         out

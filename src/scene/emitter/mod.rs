@@ -28,6 +28,7 @@ mod parallel;
 mod point;
 mod sky;
 mod spot;
+mod subset;
 mod sun;
 #[cfg(test)]
 mod tests;
