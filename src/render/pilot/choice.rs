@@ -58,15 +58,15 @@ struct Costs {
     keep: f64,
 }
 const COSTS: Costs = Costs {
-    gather_walk: 0.35,
+    gather_walk: 1.7,
     gather_step: 1.0,
-    next_event: 0.75,
-    connect: 1.1,
-    merge: 0.3,
-    shoot_walk: 0.35,
-    shoot_step: 0.9,
-    splat: 0.45,
-    keep: 0.2,
+    next_event: 1.1,
+    connect: 2.6,
+    merge: 1.0,
+    shoot_walk: 2.8,
+    shoot_step: 1.0,
+    splat: 0.8,
+    keep: 0.4,
 };
 
 /// Operations per walk.
