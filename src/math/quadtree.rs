@@ -16,6 +16,8 @@ const DEEPEST: u32 = 14;
 const SPLIT_SHARE: f64 = 0.002;
 /// … if so many samples found something in it.
 const SPLIT_COUNT: u32 = 32;
+/// Levels that a search skips by a table.
+const SKIPPED: u32 = 6;
 /// What remains of old lessons when a round of learning ends: they belong to coarser leaves and were
 /// drawn with a worse density.
 pub const MEMORY: f64 = 0.1;
@@ -47,13 +49,16 @@ struct Leaf {
 pub struct Quadtree {
     nodes: Vec<Node>,
     leaves: Vec<Leaf>,
+    /// Of every cell of a 2⁶ × 2⁶ grid (x + 64y): the smallest node or leaf around it, and its density.
+    starts: Vec<(Child, f32)>,
 }
 
 impl Default for Quadtree {
     /// The uniform density on 8 × 8 leaves.
     fn default() -> Self {
-        let mut tree = Self { nodes: vec![], leaves: vec![] };
+        let mut tree = Self { nodes: vec![], leaves: vec![], starts: vec![] };
         tree.grow(3);
+        tree.tabulate();
         tree
     }
 }
@@ -80,7 +85,7 @@ impl Quadtree {
 
     /// Memory held, in bytes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.leaves[..])
+        size_of_val(&self.nodes[..]) + size_of_val(&self.leaves[..]) + size_of_val(&self.starts[..])
     }
 
     /// A point and its density per unit area.
@@ -119,8 +124,14 @@ impl Quadtree {
     /// The leaf around a point, and the density there.
     #[inline]
     fn find(&self, at: Vec2) -> (u32, f32) {
-        let mut p = 1.0;
-        let (mut node, mut rest) = (&self.nodes[0], at.clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON)));
+        let at = at.clamp(Vec2::ZERO, Vec2::splat(ONE_MINUS_EPSILON)) * (1 << SKIPPED) as f32;
+        let (x, y) = (at.x as u32, at.y as u32);
+        let (start, mut p) = self.starts[(x + (y << SKIPPED)) as usize];
+        let mut node = match start {
+            Child::Leaf(leaf) => return (leaf, p),
+            Child::Node(node) => &self.nodes[node as usize],
+        };
+        let mut rest = at - Vec2::new(x as f32, y as f32);
         loop {
             rest *= 2.0;
             let (right, top) = (rest.x >= 1.0, rest.y >= 1.0);
@@ -132,6 +143,20 @@ impl Quadtree {
                 Child::Leaf(leaf) => return (leaf, p),
             }
         }
+    }
+
+    /// Fills the table of starts.
+    fn tabulate(&mut self) {
+        let mut starts = vec![(Child::Node(0), 1.0); 1 << (2 * SKIPPED)];
+        for (i, (child, p)) in starts.iter_mut().enumerate() {
+            let (x, y) = (i & ((1 << SKIPPED) - 1), i >> SKIPPED);
+            for level in (0..SKIPPED).rev() {
+                let Child::Node(node) = *child else { break };
+                let (node, quarter) = (&self.nodes[node as usize], (x >> level & 1) + 2 * (y >> level & 1));
+                (*child, *p) = (node.child[quarter], *p * (4.0 * node.prob[quarter]));
+            }
+        }
+        self.starts = starts;
     }
 
     /// Notes a sample at `at` that found something: `moment` is f²/p with the density p with which it
@@ -166,9 +191,10 @@ impl Quadtree {
     #[must_use]
     pub fn refined(&self, uniform: f64) -> Self {
         let total = self.mass();
-        let mut next = Self { nodes: vec![], leaves: vec![] };
+        let mut next = Self { nodes: vec![], leaves: vec![], starts: vec![] };
         if total > 0.0 && total.is_finite() {
             self.rebuild(&mut next, Child::Node(0), 1.0, 0, (total, uniform));
+            next.tabulate();
             next
         } else {
             Self::default()
