@@ -8,7 +8,7 @@
 //! This is the only place that decides it.
 
 use super::many::Many;
-use super::tree::Bound;
+use super::tree::{Bound, LightTree};
 use crate::math::distribution::Discrete;
 use glam::Vec3;
 
@@ -41,6 +41,14 @@ impl Choice {
             NextEventChoice::Many(Many::new(powers, p_across, bound)?)
         };
         Some(Self { next_event, emission: mixture(powers, UNIFORM_EMISSION)? })
+    }
+
+    /// The tree of finite emitters, if they are many.
+    pub(super) fn tree(&self) -> Option<&LightTree> {
+        match &self.next_event {
+            NextEventChoice::Few(_) => None,
+            NextEventChoice::Many(many) => Some(many.tree()),
+        }
     }
 
     /// Bytes of tables.

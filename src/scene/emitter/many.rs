@@ -131,6 +131,10 @@ impl Many {
         }
     }
 
+    pub(super) fn tree(&self) -> &LightTree {
+        &self.tree
+    }
+
     /// Bytes of tables.
     pub(super) fn bytes(&self) -> usize {
         self.tree.bytes() + size_of_val(&self.infinite[..])

@@ -2,6 +2,7 @@
 //! never zero where light arrives, estimates that are right, and better ones than by power alone.
 
 use super::densities::chi2_p_value;
+use super::estimates::learned;
 use super::*;
 use crate::describe::Mesh;
 use crate::math::warp;
@@ -365,4 +366,50 @@ fn variance_is_a_part_of_that_by_power() {
     ratios.sort_by(f64::total_cmp);
     println!("variance by power over variance by the tree: {ratios:.1?}");
     assert!(ratios[0] > 4.0 && ratios[8] > 8.0, "{ratios:.1?}");
+}
+
+/// Groups of neighbours learn together: they hold every emitter once, and few enough are left.
+#[test]
+fn groups_hold_all_emitters() {
+    let world = many(700, 500, true, 50);
+    let lights = &world.lights;
+    let (_, many) = choice(&world);
+    for most in [1, 4, 7, 64, 2000] {
+        let groups = many.tree().groups(most, |i| f64::from(lights.infos()[i].prob_emission));
+        assert!(groups.len() <= most, "{} groups for {most}", groups.len());
+        assert!(groups.len() + 3 > most.min(1200), "{} groups for {most}", groups.len());
+        let mut all = groups.concat();
+        all.sort_unstable();
+        let tree: Vec<usize> = (0..lights.emitters.len()).filter(|i| many.tree().contains(*i)).collect();
+        assert_eq!((all, tree.len()), (tree, 1200));
+    }
+}
+
+/// What groups have learned changes where light starts, not how much of it there is.
+#[test]
+fn guided_flux_of_many_is_power() {
+    let world = many(80, 60, true, 51);
+    let guide = learned(&world);
+    let mut random = Random::new(Family::Other, 53, 0, 0);
+    let power: f64 = world.lights.infos().iter().map(|i| f64::from(i.power.iter().sum::<f32>() / 3.0)).sum();
+    let n = 400_000;
+    let (mean, square) = moments(n, || {
+        let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
+        let e = world.lights.sample_emission(&world.geometry, &guide, pick, position, direction);
+        e.map_or(0.0, |e| f64::from(e.weight.mean()))
+    });
+    let error = ((square - mean * mean) / f64::from(n)).sqrt();
+    assert!((mean - power).abs() < 4.0 * error + 2e-3 * power, "{mean} ± {error} W for {power} W");
+    assert!(error < 0.02 * power, "{error}");
+    // As told at every later vertex.
+    let mut random = Random::new(Family::Other, 52, 0, 0);
+    let mut odd = 0;
+    for _ in 0..20_000 {
+        let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
+        let Some(e) = world.lights.sample_emission(&world.geometry, &guide, pick, position, direction) else { continue };
+        let d = world.lights.density_emission(&world.geometry, &guide, &e.point, e.w, e.point.y + e.w * 2.0);
+        let same = |a: f32, b: f32| (a - b).abs() <= 2e-3 * a.max(b);
+        odd += i32::from(!(same(d.p_k, e.density.p_k) && same(d.p_next, e.density.p_next)));
+    }
+    assert!(odd < 200, "{odd} densities differ");
 }

@@ -19,9 +19,10 @@ mod bound;
 mod build;
 mod node;
 
+use crate::math::warp::ONE_MINUS_EPSILON;
 pub(super) use bound::Bound;
 use glam::Vec3;
-use node::{Child, Node};
+use node::{Child, Node, WIDE};
 
 /// Trees are never deeper: two bits per level in the trail of an emitter.
 const MAX_LEVELS: u32 = 32;
@@ -94,6 +95,52 @@ impl LightTree {
         self.trails.get(emitter).is_some_and(Option::is_some)
     }
 
+    /// All emitters in at most so many groups, each the emitters of one node: from the root on, the heaviest
+    /// node is opened while there is room. `weight` as of an emitter.
+    pub(super) fn groups(&self, most: usize, weight: impl Fn(usize) -> f64) -> Vec<Vec<usize>> {
+        if self.nodes.is_empty() {
+            return vec![];
+        }
+        // Children come after their node.
+        let mut sums = vec![0.0; self.nodes.len()];
+        for at in (0..self.nodes.len()).rev() {
+            let of = |child| match child {
+                Child::Emitter(i) => weight(i),
+                Child::Node(i) => sums[i],
+            };
+            sums[at] = self.nodes[at].children().map(of).sum();
+        }
+        let (mut nodes, mut groups) = (vec![0], vec![]);
+        while let Some(k) = (0..nodes.len()).max_by(|a, b| sums[nodes[*a]].total_cmp(&sums[nodes[*b]])) {
+            let node = &self.nodes[nodes[k]];
+            if nodes.len() + groups.len() - 1 + node.children().count() > most {
+                break;
+            }
+            nodes.swap_remove(k);
+            for child in node.children() {
+                match child {
+                    Child::Emitter(i) => groups.push(vec![i]),
+                    Child::Node(i) => nodes.push(i),
+                }
+            }
+        }
+        groups.extend(nodes.into_iter().map(|node| self.emitters_of(node)));
+        groups
+    }
+
+    fn emitters_of(&self, node: usize) -> Vec<usize> {
+        let (mut open, mut found) = (vec![node], vec![]);
+        while let Some(node) = open.pop() {
+            for child in self.nodes[node].children() {
+                match child {
+                    Child::Emitter(i) => found.push(i),
+                    Child::Node(i) => open.push(i),
+                }
+            }
+        }
+        found
+    }
+
     /// Memory held, in bytes.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..]) + size_of_val(&self.trails[..])
@@ -107,15 +154,12 @@ impl LightTree {
 
 /// A lane by its probability, and `u` stretched to [0, 1) inside it.
 #[inline]
-fn pick(probs: &node::Lanes, mut u: f32) -> (usize, f32) {
-    let mut last = 0;
-    for (lane, p) in probs.iter().enumerate().filter(|(_, p)| **p > 0.0) {
-        if u < *p {
-            return (lane, (u / p).clamp(0.0, crate::math::warp::ONE_MINUS_EPSILON));
-        }
-        u -= p;
-        last = lane;
+fn pick(probs: &[f32; WIDE], u: f32) -> (usize, f32) {
+    let below = [0.0, probs[0], probs[0] + probs[1], probs[0] + probs[1] + probs[2]];
+    let mut lane = below[1..].iter().filter(|sum| u >= **sum).count();
+    while probs[lane] <= 0.0 && lane > 0 {
+        // Rounding has left a little beyond the last one.
+        lane -= 1;
     }
-    // Rounding has left a little beyond the last one.
-    (last, crate::math::warp::ONE_MINUS_EPSILON)
+    (lane, ((u - below[lane]) / probs[lane]).clamp(0.0, ONE_MINUS_EPSILON))
 }

@@ -12,12 +12,9 @@
 //! wrong for those that are near; r²/10 left the least variance of what was tried for a thousand scattered
 //! lights (1/50 to 1, added or as a bound of D²), a flat optimum.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
-/// One number of each child.
-pub(super) type Lanes = [f32; WIDE];
-
-/// Children of a node.
+/// Children of a node, one per lane of a vector register.
 pub(super) const WIDE: usize = 4;
 
 /// Emission counts as possible up to this angle beyond θ_e: rounded angles of narrow beams are off by
@@ -40,15 +37,15 @@ const EMITTER: u32 = 1 << 31;
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    center: [Lanes; 3],
-    radius: Lanes,
-    axis: [Lanes; 3],
+    center: [Vec4; 3],
+    radius: Vec4,
+    axis: [Vec4; 3],
     /// Of θ_o; a cosine of −2 is below that of any direction.
-    cos_normals: Lanes,
-    sin_normals: Lanes,
-    cos_spread: Lanes,
+    cos_normals: Vec4,
+    sin_normals: Vec4,
+    cos_spread: Vec4,
     /// I relative to that of all emitters; zero where there is no child.
-    intensity: Lanes,
+    intensity: Vec4,
     child: [u32; WIDE],
 }
 
@@ -97,58 +94,52 @@ impl Node {
         if child & EMITTER == 0 { Child::Node(index) } else { Child::Emitter(index) }
     }
 
-    /// Probabilities of the children at `x`, in the coordinates of the tree.
-    #[inline]
-    pub(super) fn probs(&self, x: Vec3) -> Lanes {
-        let (weights, total) = self.weights(x);
-        // Also no for NaN, and for what is too small to be divided by.
-        if total > LEAST_TOTAL && total < f32::INFINITY {
-            let inv = 1.0 / total;
-            weights.map(|w| w * inv)
-        } else {
-            self.shares()
-        }
+    /// Those there are.
+    pub(super) fn children(&self) -> impl Iterator<Item = Child> {
+        (0..WIDE).filter(|lane| self.intensity[*lane] > 0.0).map(|lane| self.child(lane))
     }
 
-    /// What each child could bring to `x`, and the sum.
+    /// Probabilities of the children at `x`, in the coordinates of the tree.
     #[inline]
-    pub(super) fn weights(&self, x: Vec3) -> (Lanes, f32) {
-        let weights: Lanes = std::array::from_fn(|i| self.weight(i, x));
-        (weights, (weights[0] + weights[1]) + (weights[2] + weights[3]))
+    pub(super) fn probs(&self, x: Vec3) -> [f32; WIDE] {
+        let (weights, total) = self.weights(x);
+        // Also no for NaN, and for what is too small to be divided by.
+        if total > LEAST_TOTAL && total < f32::INFINITY { (weights / Vec4::splat(total)).to_array() } else { self.shares() }
     }
 
     /// Probabilities where no light arrives, or so little that it has no number.
     #[cold]
-    fn shares(&self) -> Lanes {
-        let total: f32 = self.intensity.iter().sum();
-        self.intensity.map(|i| i / total)
+    fn shares(&self) -> [f32; WIDE] {
+        (self.intensity / self.intensity.element_sum()).to_array()
     }
 
-    /// What the child could bring to `x`. Without branches, so that four are computed as one.
-    #[inline(always)]
-    fn weight(&self, i: usize, x: Vec3) -> f32 {
-        let v = [x.x - self.center[0][i], x.y - self.center[1][i], x.z - self.center[2][i]];
-        let d2 = larger(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], LEAST_D2);
-        let inv_d = 1.0 / d2.sqrt();
-        let cos = (v[0] * self.axis[0][i] + v[1] * self.axis[1][i] + v[2] * self.axis[2][i]) * inv_d;
-        let sin = larger(1.0 - cos * cos, 0.0).sqrt();
-        let (cos_o, sin_o) = (self.cos_normals[i], self.sin_normals[i]);
-        let outside = cos < cos_o;
+    /// What each child could bring to `x`, and the sum. Without branches, all four at once.
+    #[inline]
+    pub(super) fn weights(&self, x: Vec3) -> (Vec4, f32) {
+        let v = [x.x, x.y, x.z].map(Vec4::splat);
+        let v = [v[0] - self.center[0], v[1] - self.center[1], v[2] - self.center[2]];
+        let d2 = dot(v, v).max(Vec4::splat(LEAST_D2));
+        let inv_d = Vec4::ONE / d2.sqrt();
+        let cos = dot(v, self.axis) * inv_d;
+        let sin = (Vec4::ONE - cos * cos).max(Vec4::ZERO).sqrt();
+        let (cos_o, sin_o) = (self.cos_normals, self.sin_normals);
         // θ − θ_o.
-        let cos_1 = if outside { cos * cos_o + sin * sin_o } else { 1.0 };
-        let sin_1 = if outside { sin * cos_o - cos * sin_o } else { 0.0 };
-        let sin_b = self.radius[i] * inv_d;
-        let seen = larger(1.0 - sin_b * sin_b, 0.0).sqrt();
+        let outside = cos.cmplt(cos_o);
+        let cos_1 = Vec4::select(outside, cos * cos_o + sin * sin_o, Vec4::ONE);
+        let sin_1 = Vec4::select(outside, sin * cos_o - cos * sin_o, Vec4::ZERO);
+        let sin_b = self.radius * inv_d;
+        let cos_b = (Vec4::ONE - sin_b * sin_b).max(Vec4::ZERO).sqrt();
         // From within the sphere every direction is possible.
-        let cos_b = if sin_b < 1.0 { seen } else { -2.0 };
-        let cos_2 = if cos_1 < cos_b { cos_1 * cos_b + sin_1 * sin_b } else { 1.0 };
-        let facing = if cos_2 > self.cos_spread[i] { larger(cos_2, LEAST_COS) } else { 0.0 };
-        facing * self.intensity[i] / (d2 + NEAR * self.radius[i] * self.radius[i])
+        let beyond = cos_1.cmplt(cos_b) & sin_b.cmplt(Vec4::ONE);
+        let cos_2 = Vec4::select(beyond, cos_1 * cos_b + sin_1 * sin_b, Vec4::ONE);
+        let lit = cos_2.cmpgt(self.cos_spread);
+        let facing = Vec4::select(lit, cos_2.max(Vec4::splat(LEAST_COS)), Vec4::ZERO);
+        let weights = facing * self.intensity / (d2 + self.radius * self.radius * NEAR);
+        (weights, weights.element_sum())
     }
 }
 
-/// One instruction, where `max` must also order NaN; NaN becomes `b`.
 #[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+fn dot(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
