@@ -70,7 +70,7 @@ impl Bound {
 
     /// Cost of a node in the orientation heuristic: intensity times a measure of the directions of its
     /// light times the surface of the sphere around its box (which a row of points has as well)
-    /// [Conty Estevez & Kulla 2018, sec. 4.3].
+    /// [Conty Estevez & Kulla 2018].
     pub(super) fn cost(&self) -> f64 {
         let (o, w) = (self.normals, (self.normals + self.spread).min(PI));
         let beyond = 2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos();

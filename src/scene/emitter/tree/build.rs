@@ -2,7 +2,7 @@
 //!
 //! A split is a plane between buckets of centres, along the axis and at the place where the costs of
 //! both sides are least; a box that is long in another direction pays for being split across a short
-//! one [Conty Estevez & Kulla 2018, sec. 4.3]. Where all centres are one, and in a tree that grows too
+//! one [Conty Estevez & Kulla 2018]. Where all centres are one, and in a tree that grows too
 //! deep, halves of equal number are taken instead. O(n log n).
 
 use super::bound::Bound;

@@ -7,8 +7,8 @@
 //! weight = I cosθ' / (D² + r²/10)    θ' = max(0, θ − θ_o − θ_b), 0 where θ' ≥ θ_e
 //! ```
 //!
-//! θ' is the least angle at which any point of the child may emit toward x [Conty Estevez & Kulla 2018,
-//! eq. 3]. Within the sphere it is 0 and θ_b has no meaning. That a node's emitters are about D away is
+//! θ' is the least angle at which any point of the child may emit toward x [Conty Estevez & Kulla
+//! 2018]. Within the sphere it is 0 and θ_b has no meaning. That a node's emitters are about D away is
 //! wrong for those that are near; r²/10 left the least variance of what was tried for a thousand scattered
 //! lights (1/50 to 1, added or as a bound of D²), a flat optimum.
 
