@@ -34,7 +34,7 @@ impl Geometry {
     pub fn extent(&self, shape: u32) -> Option<Extent> {
         match &self.samplers[shape as usize].0 {
             Sampler::Never => None,
-            Sampler::Triangles { first, .. } | Sampler::Parallelogram { first } => Some(self.extent_of_mesh(shape, *first)),
+            Sampler::Triangles { first, .. } | Sampler::Parallelogram { first, .. } => Some(self.extent_of_mesh(shape, *first)),
             Sampler::Analytic { index } => {
                 let analytic = &self.tree.analytic[*index as usize].0;
                 let around = |axis: Vec3, half_angle, facing| Extent {

@@ -1,7 +1,7 @@
 //! A tree over finite emitters: which of many lights is worth a next event at the point x.
 //!
 //! A walk from the root takes at every node one of four children with a probability proportional to
-//! what it could bring to x ([`Node::probs`]), so that choosing among n emitters, and the probability
+//! what it could bring to x ([`Node::weights`]), so that choosing among n emitters, and the probability
 //! of a given one, cost O(log n) [Conty Estevez & Kulla 2018; Pharr 2023, sec. 12.6.3]. What differs:
 //! - Only the place of x counts, not its normal: the joins of a measurement must agree on the
 //!   density, and a light path that arrives at x knows no side on which x would be asked.
@@ -19,10 +19,9 @@ mod bound;
 mod build;
 mod node;
 
-use crate::math::warp::ONE_MINUS_EPSILON;
 pub(super) use bound::Bound;
 use glam::Vec3;
-use node::{Child, Node, WIDE};
+use node::{Child, Node};
 
 /// Trees are never deeper: two bits per level in the trail of an emitter.
 const MAX_LEVELS: u32 = 32;
@@ -52,9 +51,9 @@ impl LightTree {
         let (mut at, mut prob) = (0, 1.0);
         loop {
             let node = &self.nodes[at];
-            let probs = node.probs(x);
-            let (lane, rest) = pick(&probs, u);
-            (u, prob) = (rest, prob * probs[lane]);
+            let weights = node.weights(x);
+            let (lane, rest) = weights.pick(u);
+            (u, prob) = (rest, prob * weights.prob(lane));
             match node.child(lane) {
                 Child::Emitter(i) => return (i, prob),
                 Child::Node(next) => at = next,
@@ -73,7 +72,7 @@ impl LightTree {
             let node = &self.nodes[at];
             let lane = (trail & 3) as usize;
             trail >>= 2;
-            prob *= node.probs(x)[lane];
+            prob *= node.weights(x).prob(lane);
             match node.child(lane) {
                 Child::Emitter(_) => return prob,
                 Child::Node(next) => at = next,
@@ -85,8 +84,7 @@ impl LightTree {
     /// with nothing in the way.
     #[inline]
     pub(super) fn irradiance(&self, x: Vec3) -> f32 {
-        let (_, total) = self.nodes[0].weights(self.to_local(x));
-        total * self.intensity * (self.scale * self.scale)
+        self.nodes[0].total(self.to_local(x)) * self.intensity * (self.scale * self.scale)
     }
 
     /// Is the emitter in the tree?
@@ -150,16 +148,4 @@ impl LightTree {
     fn to_local(&self, x: Vec3) -> Vec3 {
         (x - self.center) * self.scale
     }
-}
-
-/// A lane by its probability, and `u` stretched to [0, 1) inside it.
-#[inline]
-fn pick(probs: &[f32; WIDE], u: f32) -> (usize, f32) {
-    let below = [0.0, probs[0], probs[0] + probs[1], probs[0] + probs[1] + probs[2]];
-    let mut lane = below[1..].iter().filter(|sum| u >= **sum).count();
-    while probs[lane] <= 0.0 && lane > 0 {
-        // Rounding has left a little beyond the last one.
-        lane -= 1;
-    }
-    (lane, ((u - below[lane]) / probs[lane]).clamp(0.0, ONE_MINUS_EPSILON))
 }

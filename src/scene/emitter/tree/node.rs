@@ -12,6 +12,7 @@
 //! wrong for those that are near; r²/10 left the least variance of what was tried for a thousand scattered
 //! lights (1/50 to 1, added or as a bound of D²), a flat optimum.
 
+use crate::math::warp::ONE_MINUS_EPSILON;
 use glam::{Vec3, Vec4};
 
 /// Children of a node, one per lane of a vector register.
@@ -24,8 +25,8 @@ const SLACK: f64 = 2e-3;
 const LEAST_COS: f32 = 1e-3;
 /// Part of r² that is added to D².
 const NEAR: f32 = 0.1;
-/// Keeps x at the very place of a point light from dividing by zero.
-const LEAST_D2: f32 = 1e-30;
+/// Keeps x at the very place of a point light from dividing by zero; its square is still a number.
+const LEAST_D2: f32 = 1e-18;
 /// Sums of weights below this leave no digits, or no reciprocal.
 const LEAST_TOTAL: f32 = 1e-30;
 /// Added to radii: coordinates are of the order of one, and rounded.
@@ -99,47 +100,95 @@ impl Node {
         (0..WIDE).filter(|lane| self.intensity[*lane] > 0.0).map(|lane| self.child(lane))
     }
 
-    /// Probabilities of the children at `x`, in the coordinates of the tree.
+    /// What each child could bring to `x`, in the coordinates of the tree.
     #[inline]
-    pub(super) fn probs(&self, x: Vec3) -> [f32; WIDE] {
-        let (weights, total) = self.weights(x);
+    pub(super) fn weights(&self, x: Vec3) -> Weights {
+        let weights = Weights::new(self.bounds_at(x));
         // Also no for NaN, and for what is too small to be divided by.
-        if total > LEAST_TOTAL && total < f32::INFINITY { (weights / Vec4::splat(total)).to_array() } else { self.shares() }
+        if weights.total > LEAST_TOTAL && weights.total < f32::INFINITY { weights } else { self.shares() }
     }
 
-    /// Probabilities where no light arrives, or so little that it has no number.
+    /// Weights where no light arrives, or so little that it has no number.
     #[cold]
-    fn shares(&self) -> [f32; WIDE] {
-        (self.intensity / self.intensity.element_sum()).to_array()
+    fn shares(&self) -> Weights {
+        Weights::new(self.intensity)
     }
 
-    /// What each child could bring to `x`, and the sum. Without branches, all four at once.
+    /// The sum of all weights at `x`, 0 or infinite where they have no number.
     #[inline]
-    pub(super) fn weights(&self, x: Vec3) -> (Vec4, f32) {
+    pub(super) fn total(&self, x: Vec3) -> f32 {
+        larger(Weights::new(self.bounds_at(x)).total, 0.0)
+    }
+
+    /// The formula above times D⁴ in numerator and denominator: roots that do not wait for each other, one
+    /// division, no branches, all four children at once. A walk down the tree is one chain of these.
+    #[inline]
+    fn bounds_at(&self, x: Vec3) -> Vec4 {
         let v = [x.x, x.y, x.z].map(Vec4::splat);
         let v = [v[0] - self.center[0], v[1] - self.center[1], v[2] - self.center[2]];
+        let r2 = self.radius * self.radius;
         let d2 = dot(v, v).max(Vec4::splat(LEAST_D2));
-        let inv_d = Vec4::ONE / d2.sqrt();
-        let cos = dot(v, self.axis) * inv_d;
-        let sin = (Vec4::ONE - cos * cos).max(Vec4::ZERO).sqrt();
-        let (cos_o, sin_o) = (self.cos_normals, self.sin_normals);
-        // θ − θ_o.
-        let outside = cos.cmplt(cos_o);
-        let cos_1 = Vec4::select(outside, cos * cos_o + sin * sin_o, Vec4::ONE);
-        let sin_1 = Vec4::select(outside, sin * cos_o - cos * sin_o, Vec4::ZERO);
-        let sin_b = self.radius * inv_d;
-        let cos_b = (Vec4::ONE - sin_b * sin_b).max(Vec4::ZERO).sqrt();
+        let scale = self.intensity / (d2 * (d2 + r2 * NEAR));
+        // D cosθ, D sinθ and D cosθ_b.
+        let cos = dot(v, self.axis);
+        let sin = (d2 - cos * cos).max(Vec4::ZERO).sqrt();
+        let cos_b = (d2 - r2).max(Vec4::ZERO).sqrt();
+        let d = d2.sqrt();
+        // D times those of θ − θ_o.
+        let outside = cos.cmplt(self.cos_normals * d);
+        let cos_1 = Vec4::select(outside, cos * self.cos_normals + sin * self.sin_normals, d);
+        let sin_1 = Vec4::select(outside, sin * self.cos_normals - cos * self.sin_normals, Vec4::ZERO);
         // From within the sphere every direction is possible.
-        let beyond = cos_1.cmplt(cos_b) & sin_b.cmplt(Vec4::ONE);
-        let cos_2 = Vec4::select(beyond, cos_1 * cos_b + sin_1 * sin_b, Vec4::ONE);
-        let lit = cos_2.cmpgt(self.cos_spread);
-        let facing = Vec4::select(lit, cos_2.max(Vec4::splat(LEAST_COS)), Vec4::ZERO);
-        let weights = facing * self.intensity / (d2 + self.radius * self.radius * NEAR);
-        (weights, weights.element_sum())
+        let beyond = cos_1.cmplt(cos_b) & r2.cmplt(d2);
+        let cos_2 = Vec4::select(beyond, cos_1 * cos_b + sin_1 * self.radius, d2);
+        let lit = cos_2.cmpgt(self.cos_spread * d2);
+        Vec4::select(lit, cos_2.max(d2 * LEAST_COS) * scale, Vec4::ZERO)
+    }
+}
+
+/// Weights of four children.
+pub(super) struct Weights {
+    each: [f32; WIDE],
+    /// Sum of those before.
+    before: [f32; WIDE],
+    total: f32,
+}
+
+impl Weights {
+    #[inline(always)]
+    fn new(each: Vec4) -> Self {
+        let each = each.to_array();
+        let two = each[0] + each[1];
+        // Rounding keeps order: the total is not below the last of `before`.
+        Self { each, before: [0.0, each[0], two, two + each[2]], total: two + (each[2] + each[3]) }
+    }
+
+    /// Probability of a lane.
+    #[inline]
+    pub(super) fn prob(&self, lane: usize) -> f32 {
+        self.each[lane] / self.total
+    }
+
+    /// A lane by its probability, and `u` stretched to [0, 1) inside it.
+    #[inline]
+    pub(super) fn pick(&self, u: f32) -> (usize, f32) {
+        let at = u * self.total;
+        let mut lane = self.before[1..].iter().filter(|before| at >= **before).count();
+        while self.each[lane] <= 0.0 && lane > 0 {
+            // Rounding has left a little beyond the last one.
+            lane -= 1;
+        }
+        (lane, ((at - self.before[lane]) / self.each[lane]).clamp(0.0, ONE_MINUS_EPSILON))
     }
 }
 
 #[inline(always)]
 fn dot(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// NaN becomes `b`.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
