@@ -10,10 +10,14 @@ use super::node::{Child, Lane, Node, WIDE};
 use super::{LightTree, MAX_LEVELS, Trail};
 use crate::scene::geometry::Aabb;
 use glam::Vec3;
+use std::ops::Range;
 
 const BUCKETS: usize = 12;
 /// From this level on, parts are halved: 2³² emitters need 16 more.
 const HALVED: u32 = MAX_LEVELS - 17;
+
+/// Emitters shine the same way up to this angle.
+const ALIKE: f64 = 0.1;
 
 /// An emitter and its bounds.
 pub(super) type Item = (usize, Bound);
@@ -23,13 +27,13 @@ struct Open {
     node: usize,
     level: u32,
     trail: Trail,
-    items: std::ops::Range<usize>,
+    items: Range<usize>,
 }
 
 impl LightTree {
     /// Over some of `emitters` emitters.
     pub(in crate::scene::emitter) fn new(mut items: Vec<Item>, emitters: usize) -> Self {
-        let mut tree = Self { trails: vec![None; emitters], scale: 1.0, ..Self::default() };
+        let mut tree = Self { trails: vec![None; emitters], ranks: vec![0; emitters], scale: 1.0, ..Self::default() };
         if items.is_empty() {
             return tree;
         }
@@ -56,16 +60,26 @@ impl LightTree {
                     open.push(Open { node, level: next.level + 1, trail, items: range.clone() });
                     Child::Node(node)
                 };
-                let bound = around(&items[range]);
-                let lane_bound = tree.lane(&bound, root.intensity, child);
-                tree.nodes[next.node].set(lane, &lane_bound);
+                let of_lane = tree.lane(&items[range.clone()], root.intensity, child, range);
+                tree.nodes[next.node].set(lane, &of_lane);
             }
+        }
+        tree.sums.push(0.0);
+        for (rank, (emitter, bound)) in items.iter().enumerate() {
+            tree.ranks[*emitter] = rank as u32;
+            tree.order.push(*emitter as u32);
+            tree.sums.push(tree.sums[rank] + bound.intensity / root.intensity);
         }
         tree
     }
 
-    fn lane(&self, of: &Bound, all: f64, child: Child) -> Lane {
+    fn lane(&self, items: &[Item], all: f64, child: Child, ranks: Range<usize>) -> Lane {
+        let of = around(items);
+        // No axis, no cone and no spread is far from those of all.
+        let alike = |(_, b): &Item| b.normals > of.normals - ALIKE && b.spread > of.spread - ALIKE;
         Lane {
+            ranks,
+            alike: items.iter().all(alike),
             center: self.to_local(of.center()),
             radius: of.radius * self.scale,
             axis: of.axis.as_vec3(),
@@ -93,12 +107,12 @@ fn around(items: &[Item]) -> Bound {
 }
 
 /// Reorders the items into up to four parts, each in one piece.
-fn parts(items: &mut [Item], level: u32) -> Vec<std::ops::Range<usize>> {
+fn parts(items: &mut [Item], level: u32) -> Vec<Range<usize>> {
     let mut parts = vec![(0..items.len(), f64::INFINITY)];
     while parts.len() < WIDE {
         let splittable = parts.iter().enumerate().filter(|(_, (range, _))| range.len() > 1);
         // In a deep tree the largest part, so that all end soon.
-        let worth = |(range, cost): &(std::ops::Range<usize>, f64)| if level < HALVED { *cost } else { range.len() as f64 };
+        let worth = |(range, cost): &(Range<usize>, f64)| if level < HALVED { *cost } else { range.len() as f64 };
         let Some((k, _)) = splittable.max_by(|a, b| worth(a.1).total_cmp(&worth(b.1))) else { break };
         let (range, _) = parts.swap_remove(k);
         let middle = range.start + split(&mut items[range.clone()], level);

@@ -14,6 +14,7 @@
 
 use crate::math::warp::ONE_MINUS_EPSILON;
 use glam::{Vec3, Vec4};
+use std::ops::Range;
 
 /// Children of a node, one per lane of a vector register.
 pub(super) const WIDE: usize = 4;
@@ -31,10 +32,12 @@ const LEAST_D2: f32 = 1e-18;
 const LEAST_TOTAL: f32 = 1e-30;
 /// Added to radii: coordinates are of the order of one, and rounded.
 const ROUNDING: f32 = 1e-6;
+/// A child is far at so many of its radii: 1/d² of its emitters differs by an eighth from the mean at most.
+const FAR: f32 = 16.0;
 /// Marks a child that is an emitter.
 const EMITTER: u32 = 1 << 31;
 
-/// Three cache lines.
+/// Four cache lines.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(super) struct Node {
@@ -47,7 +50,12 @@ pub(super) struct Node {
     cos_spread: Vec4,
     /// I relative to that of all emitters; zero where there is no child.
     intensity: Vec4,
+    /// D² beyond which the child is not opened.
+    far: Vec4,
     child: [u32; WIDE],
+    /// Ranks of the child's emitters: the first, and how many.
+    first: [u32; WIDE],
+    count: [u32; WIDE],
 }
 
 /// What a lane leads to.
@@ -68,6 +76,9 @@ pub(super) struct Lane {
     pub(super) spread: f64,
     pub(super) intensity: f32,
     pub(super) child: Child,
+    pub(super) ranks: Range<usize>,
+    /// Its emitters shine the same way.
+    pub(super) alike: bool,
 }
 
 impl Node {
@@ -82,6 +93,9 @@ impl Node {
         self.sin_normals[lane] = if any { 0.0 } else { of.normals.sin() as f32 };
         self.cos_spread[lane] = (of.spread + SLACK).min(std::f64::consts::PI).cos() as f32;
         self.intensity[lane] = of.intensity.max(f32::MIN_POSITIVE);
+        // Far from a point is anywhere else.
+        self.far[lane] = if of.alike { (FAR * self.radius[lane]).powi(2) } else { f32::INFINITY };
+        (self.first[lane], self.count[lane]) = (of.ranks.start as u32, of.ranks.len() as u32);
         self.child[lane] = match of.child {
             Child::Emitter(i) => i as u32 | EMITTER,
             Child::Node(i) => i as u32,
@@ -100,30 +114,39 @@ impl Node {
         (0..WIDE).filter(|lane| self.intensity[*lane] > 0.0).map(|lane| self.child(lane))
     }
 
+    /// Ranks of the emitters of a child.
+    #[inline]
+    pub(super) fn ranks(&self, lane: usize) -> Range<usize> {
+        let first = self.first[lane] as usize;
+        first..first + self.count[lane] as usize
+    }
+
     /// What each child could bring to `x`, in the coordinates of the tree.
     #[inline]
     pub(super) fn weights(&self, x: Vec3) -> Weights {
-        let weights = Weights::new(self.bounds_at(x));
+        let (each, far) = self.bounds_at(x);
+        let weights = Weights::new(each, far);
         // Also no for NaN, and for what is too small to be divided by.
-        if weights.total > LEAST_TOTAL && weights.total < f32::INFINITY { weights } else { self.shares() }
+        if weights.total > LEAST_TOTAL && weights.total < f32::INFINITY { weights } else { self.shares(far) }
     }
 
     /// Weights where no light arrives, or so little that it has no number.
     #[cold]
-    fn shares(&self) -> Weights {
-        Weights::new(self.intensity)
+    fn shares(&self, far: u32) -> Weights {
+        Weights::new(self.intensity, far)
     }
 
     /// The sum of all weights at `x`, 0 or infinite where they have no number.
     #[inline]
     pub(super) fn total(&self, x: Vec3) -> f32 {
-        larger(Weights::new(self.bounds_at(x)).total, 0.0)
+        larger(Weights::new(self.bounds_at(x).0, 0).total, 0.0)
     }
 
     /// The formula above times D⁴ in numerator and denominator: roots that do not wait for each other, one
-    /// division, no branches, all four children at once. A walk down the tree is one chain of these.
+    /// division, no branches, all four children at once. A walk down the tree is one chain of these. Also which
+    /// children are far, as bits.
     #[inline]
-    fn bounds_at(&self, x: Vec3) -> Vec4 {
+    fn bounds_at(&self, x: Vec3) -> (Vec4, u32) {
         let v = [x.x, x.y, x.z].map(Vec4::splat);
         let v = [v[0] - self.center[0], v[1] - self.center[1], v[2] - self.center[2]];
         let r2 = self.radius * self.radius;
@@ -142,7 +165,7 @@ impl Node {
         let beyond = cos_1.cmplt(cos_b) & r2.cmplt(d2);
         let cos_2 = Vec4::select(beyond, cos_1 * cos_b + sin_1 * self.radius, d2);
         let lit = cos_2.cmpgt(self.cos_spread * d2);
-        Vec4::select(lit, cos_2.max(d2 * LEAST_COS) * scale, Vec4::ZERO)
+        (Vec4::select(lit, cos_2.max(d2 * LEAST_COS) * scale, Vec4::ZERO), d2.cmpgt(self.far).bitmask())
     }
 }
 
@@ -152,15 +175,22 @@ pub(super) struct Weights {
     /// Sum of those before.
     before: [f32; WIDE],
     total: f32,
+    far: u32,
 }
 
 impl Weights {
     #[inline(always)]
-    fn new(each: Vec4) -> Self {
+    fn new(each: Vec4, far: u32) -> Self {
         let each = each.to_array();
         let two = each[0] + each[1];
         // Rounding keeps order: the total is not below the last of `before`.
-        Self { each, before: [0.0, each[0], two, two + each[2]], total: two + (each[2] + each[3]) }
+        Self { each, before: [0.0, each[0], two, two + each[2]], total: two + (each[2] + each[3]), far }
+    }
+
+    /// Need the child not be opened?
+    #[inline]
+    pub(super) fn is_far(&self, lane: usize) -> bool {
+        self.far >> lane & 1 == 1
     }
 
     /// Probability of a lane.
