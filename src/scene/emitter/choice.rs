@@ -27,7 +27,7 @@ pub(super) struct Choice {
 pub(super) enum NextEventChoice {
     /// The same for every x.
     Few(Discrete),
-    Many(Many),
+    Many(Box<Many>),
 }
 
 impl Choice {
@@ -38,7 +38,7 @@ impl Choice {
         let next_event = if lit <= FEW {
             NextEventChoice::Few(mixture(powers, 1.0)?)
         } else {
-            NextEventChoice::Many(Many::new(powers, p_across, bound)?)
+            NextEventChoice::Many(Box::new(Many::new(powers, p_across, bound)?))
         };
         Some(Self { next_event, emission: mixture(powers, UNIFORM_EMISSION)? })
     }

@@ -98,6 +98,23 @@ fn many(shapes: u32, others: u32, infinite: bool, seed: u64) -> World {
     World::new(areas, models)
 }
 
+/// Tiles that shine the same way, and points: parts of the tree that are not opened from far away.
+fn tiled() -> World {
+    let mut random = Random::new(Family::Other, 48, 0, 0);
+    let tile = |i: u32| {
+        let at = Vec3::new((i % 15) as f32, (i / 15) as f32, 0.0) * 0.1;
+        (
+            shape(Form::Rectangle, Mat4::from_translation(at) * Mat4::from_scale(Vec3::splat(0.04))),
+            constant([1.0 + (i % 7) as f32; 3]),
+        )
+    };
+    let mut point = |i: u32| {
+        let position = Vec3::new(-1.0, -1.0, 1.0) + 0.5 * warp::sphere_uniform(random.unit2());
+        (EmitterModel::Point { position, intensity: [0.01 * (1 + i % 5) as f32; 3] }, None)
+    };
+    World::new((0..225).map(tile).collect(), (0..100).map(&mut point).collect())
+}
+
 fn choice(world: &World) -> (&NextEventChoice, &Many) {
     let next_event = &world.lights.choice.as_ref().expect("lit").next_event;
     let NextEventChoice::Many(many) = next_event else { panic!("few lights") };
@@ -138,7 +155,7 @@ fn few_lights_are_chosen_evenly() {
 
 #[test]
 fn probabilities_sum_to_one_everywhere() {
-    for world in [many(9, 0, false, 1), many(0, 9, true, 2), many(60, 40, true, 3), many(700, 300, false, 4)] {
+    for world in [many(9, 0, false, 1), many(0, 9, true, 2), many(60, 40, true, 3), many(700, 300, false, 4), tiled()] {
         let (next_event, tree) = choice(&world);
         for x in places(&world, 300, 1).into_iter().take(300) {
             let sums = (0..world.lights.emitters.len()).fold((0.0f64, 0.0f64), |(all, by_tree), i| {
@@ -174,9 +191,9 @@ fn behind_all_lights_power_decides() {
 /// Every u leads to an emitter, with the probability that is told for it, and as many to each as it says.
 #[test]
 fn samples_have_the_told_probabilities() {
-    for world in [many(12, 0, false, 5), many(40, 30, true, 6)] {
+    for world in [many(12, 0, false, 5), many(40, 30, true, 6), tiled()] {
         let (next_event, _) = choice(&world);
-        for x in places(&world, 90, 2).into_iter().rev().take(12) {
+        for x in places(&world, 400, 2).into_iter().rev().take(12) {
             const N: u32 = 1 << 16;
             let mut observed = vec![0.0; world.lights.emitters.len()];
             for k in 0..N {
@@ -334,9 +351,8 @@ fn tested_variance(world: &World, x: Vec3, n: Vec3, random: &mut Random) -> f64 
 
 #[test]
 fn estimates_are_right() {
-    for (seed, infinite) in [(30, true), (31, false)] {
-        let world = many(600, 400, infinite, seed);
-        let mut random = Random::new(Family::Other, 45, 0, seed);
+    for (seed, world) in [many(600, 400, true, 30), many(600, 400, false, 31), tiled()].into_iter().enumerate() {
+        let mut random = Random::new(Family::Other, 45, 0, seed as u64);
         for x in places(&world, 1100, 5).into_iter().rev().take(8) {
             let n = warp::sphere_uniform(random.unit2());
             tested_variance(&world, x, n, &mut random);
