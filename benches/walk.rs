@@ -1,5 +1,8 @@
 //! Time of what a render is made of: passes of walks, the film, the choice of lights.
 
+#[path = "lights/tiles.rs"]
+mod tiles;
+
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use nephroid::film::layout::TILE_PIXELS;
@@ -77,14 +80,16 @@ fn lights(c: &mut Criterion) {
     let guide = Guide::default();
     let mut group = c.benchmark_group("lights");
     group.throughput(Throughput::Elements(inputs.len() as u64));
-    for name in ["cornell", "lattice", "models"] {
-        let scene = scene(name);
+    let text =
+        |xml: String| nephroid::load_str(&xml, Path::new("."), &Default::default()).unwrap_or_else(|e| panic!("{e}")).scene;
+    let ours = ["cornell", "lattice", "models"].map(|name| (name, scene(name)));
+    for (name, scene) in ours.into_iter().chain([("10 panels", text(tiles::panels())), ("10000 tiles", text(tiles::tiles()))]) {
         let (center, radius) = scene.lights.sphere();
         group.bench_function(BenchmarkId::new("next event", name), |b| {
             b.iter(|| {
                 for (u_pick, u, at) in &inputs {
                     let x = center + 0.5 * radius * Vec3::new(at.x - 0.5, u.y - 0.5, at.y - 0.5);
-                    black_box(scene.lights.sample_next_event(&scene.geometry, &guide, x, *u_pick, *u));
+                    black_box(scene.lights.sample_next_event(&scene.geometry, &guide, black_box(x), *u_pick, *u));
                 }
             });
         });

@@ -157,6 +157,8 @@ scenes_agree! {
     crop_window: "crop window",
     under_water: "under water",
     orthographic: "orthographic",
+    many_lamps: "many lamps",
+    tiles_and_sky: "tiles and sky",
 }
 
 #[test]

@@ -73,6 +73,33 @@ const PLASTICS: &str = r#"
 <shape type="cube"><transform name="to_world"><scale value="0.2"/><translate x="0" y="-0.8" z="0.5"/></transform>
   <bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="diffuse"/><bsdf type="conductor"><string name="material" value="none"/></bsdf></bsdf></shape>"#;
 
+/// A sphere and a tube that shine, and one that shines inwards.
+const LAMPS: &str = r#"
+<shape type="sphere"><point name="center" value="-0.6, 0.3, 0.1"/><float name="radius" value="0.1"/><emitter type="area"><rgb name="radiance" value="4, 6, 8"/></emitter></shape>
+<shape type="cylinder"><point name="p0" value="0.5, -0.95, -0.5"/><point name="p1" value="0.6, -0.2, -0.6"/><float name="radius" value="0.05"/><emitter type="area"><rgb name="radiance" value="6, 3, 2"/></emitter></shape>
+<shape type="sphere"><point name="center" value="0.75, 0.5, 0.3"/><float name="radius" value="0.1"/><boolean name="flip_normals" value="true"/><bsdf type="null"/><emitter type="area"><rgb name="radiance" value="3, 3, 3"/></emitter></shape>"#;
+
+const SPOTS: &str = r#"<emitter type="spot"><rgb name="intensity" value="3, 5, 6"/><float name="cutoff_angle" value="110"/><float name="beam_width" value="60"/>
+  <transform name="to_world"><lookat origin="-0.2, -0.4, 0.6" target="0.2, -1, -0.4" up="0, 0, 1"/></transform></emitter>
+<emitter type="point"><point name="position" value="-0.7, -0.6, 0.6"/><rgb name="intensity" value="0.3, 0.3, 0.2"/></emitter>"#;
+
+/// Lights that tile a square of half the side `half` below the ceiling with gaps between them, some tilted.
+fn tiles(columns: u32, rows: u32, half: f32) -> String {
+    let tile = |i: u32| {
+        let size = [half / columns as f32, half / rows as f32];
+        let at = [i % columns, i / columns].map(|k| 2.0 * k as f32 + 1.0);
+        let [x, z] = [size[0] * at[0] - half, size[1] * at[1] - half];
+        let (tilt, radiance) = (90.0 + 15.0 * ((i % 3) as f32 - 1.0), 4.0 + (i % 5) as f32);
+        format!(
+            r#"<shape type="rectangle"><transform name="to_world"><scale x="{}" y="{}"/><rotate x="1" angle="{tilt}"/><translate x="{x}" y="0.9" z="{z}"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="{radiance}, {radiance}, 6"/></emitter></shape>"#,
+            0.9 * size[0],
+            0.9 * size[1]
+        )
+    };
+    (0..columns * rows).map(tile).collect()
+}
+
 fn xml(sensor: &str, film: &str, parts: &[&str]) -> String {
     format!(r#"<scene version="3.0.0">{}{WALLS}{}</scene>"#, sensor.replace("FILM", film), parts.concat())
 }
@@ -137,6 +164,7 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
     let directional = r#"<emitter type="directional"><vector name="direction" value="0.4, -1, -0.6"/><rgb name="irradiance" value="3, 2.7, 2"/></emitter>"#;
     let sun = r#"<emitter type="directional"><vector name="direction" value="0.4, -1, -0.6"/><rgb name="irradiance" value="3, 2.7, 2"/><float name="angular_diameter" value="30"/></emitter>"#;
     let constant = r#"<emitter type="constant"><rgb name="radiance" value="0.5, 0.6, 0.8"/></emitter>"#;
+    let lamps = format!("{}{}{point}{spot}{SPOTS}{constant}", tiles(4, 3, 0.45), LAMPS);
     vec![
         scene("diffuse box", CAMERA, FILM, &[CEILING, AREA, BLOCK]),
         scene("glass and mirror", CAMERA, FILM, &[CEILING, AREA, GLASS_AND_MIRROR]),
@@ -154,6 +182,9 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
         scene("crop window", CAMERA, CROP, &[CEILING, AREA, BLOCK]),
         scene("under water", UNDER_WATER, FILM, &[CEILING, AREA, WATER]),
         scene("orthographic", ORTHOGRAPHIC, FILM, &[CEILING, AREA, BLOCK]),
+        // More lights than are asked evenly: a tree chooses among them.
+        scene("many lamps", CAMERA, FILM, &[&lamps, BLOCK]),
+        scene("tiles and sky", CAMERA, FILM, &[&tiles(4, 4, 0.6), LAMPS, constant, GLASS_AND_MIRROR]),
     ]
 }
 

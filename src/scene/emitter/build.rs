@@ -8,6 +8,7 @@ use super::point::Point;
 use super::sky::Sky;
 use super::spot::{Parameters, Spot};
 use super::sun::Sun;
+use super::tree::Bound;
 use super::{Emitter, Lights};
 use crate::describe::{
     AreaEmission, EmitterDescription, EmitterModel, Image, ImageDescription, ImageId, Place, Placed, Problems,
@@ -30,7 +31,8 @@ pub struct EmitterInfo {
     pub id: Option<String>,
     /// Emitted power in W, linear sRGB; infinite emitters: what enters the scene's sphere.
     pub power: [f32; 3],
-    /// Probability of being chosen for a next event.
+    /// Probability of being chosen for a next event; among many emitters, where it depends on the point
+    /// that is lit, the part of the choice that does not.
     pub prob_next_event: f32,
     /// Probability of being chosen for emission.
     pub prob_emission: f32,
@@ -68,10 +70,10 @@ impl Lights {
             let (emitter, power) = lights.other(other, images, problems);
             powers.push(lights.push(emitter, kind_of(&other.model), &other.id, power, other.place, problems));
         }
-        lights.choice = Choice::new(&powers);
+        lights.choice = Choice::new(&powers, lights.p_across, |i| lights.bound(i, powers[i], geometry));
         if let Some(choice) = &lights.choice {
             for (i, info) in lights.infos.iter_mut().enumerate() {
-                info.prob_next_event = choice.next_event.prob(i);
+                info.prob_next_event = choice.next_event.prob_anywhere(i);
                 info.prob_emission = choice.emission.prob(i);
             }
         }
@@ -109,6 +111,16 @@ impl Lights {
             place,
         });
         share
+    }
+
+    /// What bounds the light of a finite emitter of so much power.
+    fn bound(&self, i: usize, power: f64, geometry: &Geometry) -> Option<Bound> {
+        match &self.emitters[i] {
+            Emitter::Area(area) => Some(Bound::area(&geometry.extent(area.shape)?, power)),
+            Emitter::Point(point) => Some(Bound::point(point, power)),
+            Emitter::Spot(spot) => Some(Bound::spot(spot, power)),
+            Emitter::Parallel(_) | Emitter::Sky(_) | Emitter::Dark => None,
+        }
     }
 
     fn area(

@@ -11,12 +11,15 @@
 //! | point, spot | direction of travel | the emitter's own |
 //! | parallel, sky | place on the disk across the direction of travel | 1/πR² |
 //!
-//! and the probability of choosing each emitter. The unguided density is always mixed in
+//! and the probability of choosing each emitter. Where there are more than [`MOST_SQUARES`], a light path or
+//! two from each would teach nothing but noise: emitters that are close to each other and alike (nodes of
+//! the tree of next events) then learn as one, and share what falls to them as without a guide. The unguided density is always mixed in
 //! ([`UNGUIDED`]), so that no path is lost and no contribution grows by more than its inverse. What the
 //! guide learns is decided by the caller (a pilot); the densities it changes are those of emission
 //! alone, so every weight sees the change through [`super::EmissionDensity`] and the measurement stays
 //! unbiased whatever was learned. Compare [Vorba 2014], who guide both walkers.
 
+use super::choice::Choice;
 use super::{Emission, Emitter, Lights};
 use crate::math::Frame;
 use crate::math::distribution::Discrete;
@@ -24,21 +27,50 @@ use crate::math::quadtree::{MEMORY, Quadtree};
 use crate::math::warp;
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 /// Share of the unguided density in every guided one.
 pub const UNGUIDED: f32 = 0.2;
 /// Share of the unguided probability in the choice of the emitter.
 const UNGUIDED_CHOICE: f64 = 0.2;
-/// So many emitters, the most probable ones, have a square of their own.
+/// Up to so many emitters learn each for itself, more in so many groups; the most probable groups have a
+/// square of their own.
 const MOST_SQUARES: usize = 64;
 
 /// Learned densities of emission; the default guides nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Guide {
+    groups: Arc<Groups>,
+    /// By group.
     squares: Vec<Option<Quadtree>>,
-    /// Σ over light paths of (value)² times the probability of the emitter.
+    /// By group, Σ over light paths of (value)² times the probability of the group.
     moments: Vec<f64>,
+    /// Among emitters.
     choice: Option<Discrete>,
+}
+
+/// Which emitters learn together.
+#[derive(Debug, Default)]
+struct Groups {
+    /// Group of each emitter, and its share of that group's probability: the same with and without a
+    /// guide. Nothing for emitters that are never chosen.
+    of: Vec<Option<(u32, f32)>>,
+}
+
+impl Groups {
+    /// With the number of groups and the probability of each.
+    fn new(lights: &Lights) -> (Self, Vec<f64>) {
+        let infos = lights.infos();
+        let (mut of, mut probs) = (vec![None; infos.len()], vec![]);
+        for members in lights.groups(MOST_SQUARES) {
+            let prob: f64 = members.iter().map(|i| f64::from(infos[*i].prob_emission)).sum();
+            for i in members {
+                of[i] = Some((probs.len() as u32, (f64::from(infos[i].prob_emission) / prob) as f32));
+            }
+            probs.push(prob);
+        }
+        (Self { of }, probs)
+    }
 }
 
 /// Where in the guide's squares a light path started, and how probable that was.
@@ -57,25 +89,24 @@ pub struct Start {
 impl Guide {
     /// A guide that has learned nothing yet and can learn of the emitters of `lights`.
     pub fn new(lights: &Lights) -> Self {
-        let infos = lights.infos();
-        let mut order: Vec<usize> = (0..infos.len()).collect();
-        order.sort_by(|a, b| infos[*b].prob_emission.total_cmp(&infos[*a].prob_emission).then(a.cmp(b)));
-        let mut squares = vec![None; infos.len()];
-        for i in order.into_iter().take(MOST_SQUARES).filter(|i| infos[*i].prob_emission > 0.0) {
-            squares[i] = Some(Quadtree::default());
-        }
-        Self { squares, moments: vec![0.0; infos.len()], choice: None }
+        let (groups, probs) = Groups::new(lights);
+        let mut order: Vec<usize> = (0..probs.len()).collect();
+        order.sort_by(|a, b| probs[*b].total_cmp(&probs[*a]).then(a.cmp(b)));
+        let mut squares = vec![None; probs.len()];
+        order.into_iter().take(MOST_SQUARES).for_each(|group| squares[group] = Some(Quadtree::default()));
+        Self { groups: Arc::new(groups), squares, moments: vec![0.0; probs.len()], choice: None }
     }
 
     /// A light path that started at `start` contributed `value` (any measure of what it adds to the
     /// noise, non-negative).
     pub fn learn(&mut self, start: &Start, value: f64) {
-        let square = value * value * f64::from(start.prob);
+        let Some((group, share)) = self.group(start.emitter) else { return };
+        let square = value * value * f64::from(start.prob / share);
         if !(square > 0.0 && square.is_finite()) {
             return;
         }
-        self.moments[start.emitter] += square;
-        if let Some(tree) = &mut self.squares[start.emitter] {
+        self.moments[group] += square;
+        if let Some(tree) = &mut self.squares[group] {
             tree.learn(start.at, square * f64::from(start.p));
         }
     }
@@ -85,20 +116,23 @@ impl Guide {
     pub fn refined(&self, lights: &Lights) -> Self {
         let total: f64 = self.moments.iter().map(|m| m.sqrt()).sum();
         let choice = if total > 0.0 && total.is_finite() {
-            let prob = |(moment, info): (&f64, &super::EmitterInfo)| {
-                (1.0 - UNGUIDED_CHOICE) * moment.sqrt() / total + UNGUIDED_CHOICE * f64::from(info.prob_emission)
+            let prob = |(i, info): (usize, &super::EmitterInfo)| {
+                let learned = self.group(i).map_or(0.0, |(group, share)| self.moments[group].sqrt() / total * f64::from(share));
+                (1.0 - UNGUIDED_CHOICE) * learned + UNGUIDED_CHOICE * f64::from(info.prob_emission)
             };
-            Discrete::new(self.moments.iter().zip(lights.infos()).map(prob))
+            Discrete::new(lights.infos().iter().enumerate().map(prob))
         } else {
             None
         };
         let squares = self.squares.iter().map(|s| s.as_ref().map(|tree| tree.refined(0.0))).collect();
-        Self { squares, moments: self.moments.iter().map(|m| MEMORY * m).collect(), choice }
+        let moments = self.moments.iter().map(|m| MEMORY * m).collect();
+        Self { groups: self.groups.clone(), squares, moments, choice }
     }
 
     /// Memory held, in bytes.
     pub fn bytes(&self) -> usize {
-        self.squares.iter().flatten().map(Quadtree::bytes).sum::<usize>() + size_of_val(&self.squares[..])
+        let squares = self.squares.iter().flatten().map(Quadtree::bytes).sum::<usize>();
+        squares + size_of_val(&self.squares[..]) + size_of_val(&self.groups.of[..])
     }
 
     /// The learned choice of the emitter, if there is one.
@@ -111,7 +145,14 @@ impl Guide {
     fn square(&self, emitter: usize) -> Option<&Quadtree> {
         // Without a choice nothing was learned: the squares are uniform, which no emitter is.
         self.choice.as_ref()?;
-        self.squares.get(emitter)?.as_ref()
+        self.squares[self.group(emitter)?.0].as_ref()
+    }
+
+    /// Group of the emitter and its share of it.
+    #[inline]
+    fn group(&self, emitter: usize) -> Option<(usize, f32)> {
+        let (group, share) = (*self.groups.of.get(emitter)?)?;
+        Some((group as usize, share))
     }
 
     /// A direction of travel from `emitter`: by its own sampling (`own`) or the learned one.
@@ -161,6 +202,18 @@ impl Guide {
 }
 
 impl Lights {
+    /// All emitters that emit, each alone if there are at most so many, else the finite ones in groups of
+    /// neighbours.
+    fn groups(&self, most: usize) -> Vec<Vec<usize>> {
+        let lit = (0..self.infos.len()).filter(|i| self.infos[*i].prob_emission > 0.0);
+        let mut alone: Vec<Vec<usize>> = lit.map(|i| vec![i]).collect();
+        let Some(tree) = self.choice.as_ref().filter(|_| alone.len() > most).and_then(Choice::tree) else { return alone };
+        alone.retain(|group| !tree.contains(group[0]));
+        let left = most.saturating_sub(alone.len()).max(1);
+        alone.extend(tree.groups(left, |i| f64::from(self.infos[i].prob_emission)));
+        alone
+    }
+
     /// Where a light path started, as the guide sees it; `None` for what it cannot learn.
     pub fn start(&self, guide: &Guide, e: &Emission) -> Option<Start> {
         let emitter = e.point.emitter.0 as usize;

@@ -34,7 +34,7 @@ impl Lights {
     #[inline]
     pub fn sample_next_event(&self, geometry: &Geometry, guide: &Guide, x: Vec3, u_pick: f32, u: Vec2) -> Option<NextEvent> {
         let choice = self.choice.as_ref()?;
-        let (i, prob, _) = choice.next_event.sample(u_pick);
+        let (i, prob) = choice.next_event.sample(x, u_pick);
         self.next_event_from(geometry, guide, x, (i, prob), u)
     }
 
@@ -120,7 +120,7 @@ impl Lights {
     #[inline]
     pub fn density_next_event(&self, geometry: &Geometry, x: Vec3, point: &EmitterPoint, w: Vec3) -> f32 {
         let Some((choice, i)) = self.chosen(point.emitter) else { return 0.0 };
-        choice.next_event.prob(i) * self.density_of(geometry, x, point, w)
+        choice.next_event.prob(i, x) * self.density_of(geometry, x, point, w)
     }
 
     /// The same without the choice of the emitter, as of [`Self::next_event_of`].
@@ -353,7 +353,8 @@ impl Lights {
     /// Bytes of tables.
     pub fn bytes(&self) -> usize {
         let tables = |e: &Emitter| if let Emitter::Sky(sky) = e { sky.bytes() } else { 0 };
-        self.emitters.iter().map(tables).sum::<usize>() + std::mem::size_of_val(&self.emitters[..])
+        let choice = self.choice.as_ref().map_or(0, Choice::bytes);
+        self.emitters.iter().map(tables).sum::<usize>() + std::mem::size_of_val(&self.emitters[..]) + choice
     }
 
     #[inline]

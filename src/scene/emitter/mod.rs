@@ -15,7 +15,8 @@
 //! | sky: constant, image, sun disk | P_n·p_w, sr⁻¹ | P_e·p_w, sr⁻¹ | 1/πR², m⁻² | yes |
 //!
 //! p_next is what a [`Guide`] changes, and P_e. P_n and P_e are the probabilities of choosing the emitter (`choice`), R the radius of the
-//! sphere around the scene; infinite emitters shoot from a disk of that radius across the direction.
+//! sphere around the scene; infinite emitters shoot from a disk of that radius across the direction. Among
+//! many emitters P_n depends on x: a tree over them (`tree`) finds those that matter there.
 //! The set of emitters is closed: an enum, matched once per question.
 
 mod area;
@@ -24,6 +25,7 @@ mod choice;
 mod envmap;
 pub mod guide;
 mod lights;
+mod many;
 mod parallel;
 mod point;
 mod sky;
@@ -32,6 +34,7 @@ mod subset;
 mod sun;
 #[cfg(test)]
 mod tests;
+mod tree;
 
 pub use build::EmitterInfo;
 pub use guide::Guide;

@@ -119,6 +119,23 @@ impl Spot {
         }
     }
 
+    /// Middle of the cone, unit.
+    pub(super) fn axis(&self) -> Vec3 {
+        self.axes.z_axis
+    }
+
+    /// Half angles of full intensity and of any, radians.
+    pub(super) fn half_angles(&self) -> (f64, f64) {
+        let angle = |vers: f32| 2.0 * (0.5 * f64::from(vers)).sqrt().min(1.0).asin();
+        (angle(self.vers_beam), f64::from(self.cutoff))
+    }
+
+    /// Density of [`Self::sample`] inside the beam, sr⁻¹: one over the solid angle, the falloff counted
+    /// by half.
+    pub(super) fn p_beam(&self) -> f32 {
+        self.p_beam
+    }
+
     /// ∫ I dω, W; a projected image by quadrature over the cone.
     pub(super) fn power(&self, textures: &Textures) -> Spectrum {
         const N: u32 = 64;

@@ -52,6 +52,11 @@ impl Analytic {
         Aabb { min: out(min, false), max: out(max, true) }
     }
 
+    /// Radius of the smallest sphere around the centre of the box that is known to hold the shape.
+    pub(super) fn reach(&self) -> f64 {
+        each!(self, s => s.reach())
+    }
+
     /// Surface area.
     pub(super) fn area(&self) -> f64 {
         each!(self, s => s.area())

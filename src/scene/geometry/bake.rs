@@ -50,8 +50,9 @@ pub(super) enum Sampler {
     Never,
     /// Triangles from primitive `first` on, chosen by the running sum of areas (normalised).
     Triangles { first: u32, cdf: Vec<f64> },
-    /// The rectangle of the two triangles from primitive `first` on, as one.
-    Parallelogram { first: u32 },
+    /// The rectangle of the two triangles from primitive `first` on, as one; `v` are the vertices of the
+    /// first, so that a point of one of many lamps waits for memory once less.
+    Parallelogram { first: u32, v: [u32; 3] },
     /// An analytic shape.
     Analytic { index: u32 },
 }
@@ -92,7 +93,7 @@ impl Baked {
             Form::Rectangle => {
                 self.mesh(index, &meshes::rectangle(), &m, false, input.place);
                 if let (Sampler::Triangles { first, .. }, area) = self.samplers[index as usize] {
-                    self.samplers[index as usize] = (Sampler::Parallelogram { first }, area);
+                    self.samplers[index as usize] = (Sampler::Parallelogram { first, v: self.prims[first as usize].v }, area);
                 }
             }
             Form::Disk => self.analytic(index, Analytic::Disk(Disk::new(m, input.flip_normals))),

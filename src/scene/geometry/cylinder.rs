@@ -66,6 +66,11 @@ impl Cylinder {
         (a.min(b) - reach, a.max(b) + reach)
     }
 
+    pub(super) fn reach(&self) -> f64 {
+        let m = self.to_world.matrix3;
+        m.x_axis.length().hypot(0.5 * m.z_axis.length())
+    }
+
     pub(super) fn area(&self) -> f64 {
         let m = self.to_world.matrix3;
         2.0 * PI * m.x_axis.length() * m.z_axis.length()

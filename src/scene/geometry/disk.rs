@@ -55,6 +55,17 @@ impl Disk {
         (self.to_world.translation - reach, self.to_world.translation + reach)
     }
 
+    /// The longer half axis of the ellipse.
+    pub(super) fn reach(&self) -> f64 {
+        let m = self.to_world.matrix3;
+        let (xx, yy, xy) = (m.x_axis.length_squared(), m.y_axis.length_squared(), m.x_axis.dot(m.y_axis));
+        (0.5 * (xx + yy + (xx - yy).hypot(2.0 * xy))).sqrt()
+    }
+
+    pub(super) fn normal(&self) -> DVec3 {
+        self.n
+    }
+
     pub(super) fn area(&self) -> f64 {
         let m = self.to_world.matrix3;
         PI * m.x_axis.cross(m.y_axis).length()

@@ -12,6 +12,7 @@ mod binary;
 mod build_tree;
 mod cylinder;
 mod disk;
+mod extent;
 mod input;
 mod instance;
 mod lanes;
@@ -34,6 +35,7 @@ mod traverse;
 mod tree;
 mod triangle;
 
+pub use extent::Extent;
 pub use input::{Form, ShapeInput};
 pub use pieces::{Piece, Pieces};
 pub use ray::{Aabb, Hit, Ray};

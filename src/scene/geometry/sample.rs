@@ -42,19 +42,18 @@ impl Geometry {
                 let i = cdf.partition_point(|c| *c <= x).clamp(1, cdf.len() - 1) - 1;
                 let rest = (((x - cdf[i]) / (cdf[i + 1] - cdf[i])) as f32).clamp(0.0, ONE_MINUS_EPSILON);
                 let b = triangle_uniform(Vec2::new(rest, u.y));
-                self.triangle_point(first + i as u32, b.x, b.y, p_a)
+                self.triangle_point(shape, self.prims[(first + i as u32) as usize].v, b.x, b.y, p_a)
             }
             // The first triangle's edges are a → b and a → c = b + (d − a).
-            Sampler::Parallelogram { first } => self.triangle_point(*first, u.x - u.y, u.y, p_a),
+            Sampler::Parallelogram { v, .. } => self.triangle_point(shape, *v, u.x - u.y, u.y, p_a),
             Sampler::Analytic { index } => point(self.tree.analytic[*index as usize].0.sample_area(u), p_a),
             Sampler::Never => ShapePoint { p: Vec3::ZERO, p_error: 0.0, n_g: Vec3::Z, uv: Vec2::ZERO, p_a: 0.0 },
         }
     }
 
-    fn triangle_point(&self, prim: u32, u: f32, v: f32, p_a: f32) -> ShapePoint {
-        let prim = self.prims[prim as usize];
-        let shape = &self.shapes[prim.shape as usize];
-        let [a, b, c] = prim.v.map(|i| &self.vertices[i as usize]);
+    fn triangle_point(&self, shape: u32, corners: [u32; 3], u: f32, v: f32, p_a: f32) -> ShapePoint {
+        let shape = &self.shapes[shape as usize];
+        let [a, b, c] = corners.map(|i| &self.vertices[i as usize]);
         let (e1, e2) = (b.p - a.p, c.p - a.p);
         let (face, double_area) = normal_of(e1, e2);
         let w = 1.0 - u - v;

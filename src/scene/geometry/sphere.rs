@@ -73,6 +73,10 @@ impl Sphere {
         (self.center - self.radius, self.center + self.radius)
     }
 
+    pub(super) fn reach(&self) -> f64 {
+        self.radius
+    }
+
     pub(super) fn area(&self) -> f64 {
         4.0 * PI * self.radius * self.radius
     }

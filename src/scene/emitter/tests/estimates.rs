@@ -59,7 +59,7 @@ fn mean(samples: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// What a pilot might learn: some emitters, directions and places matter more than others.
-fn learned(world: &World) -> Guide {
+pub(super) fn learned(world: &World) -> Guide {
     let mut guide = Guide::new(&world.lights);
     let mut random = Random::new(Family::Other, 21, 0, 0);
     for _ in 0..4 {

@@ -3,6 +3,7 @@
 mod densities;
 mod estimates;
 mod manners;
+mod many;
 mod mitsuba;
 
 use super::*;
