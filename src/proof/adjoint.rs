@@ -137,13 +137,13 @@ pub fn adjoint(scene: &mut Scene, effort: &Effort) -> Result<Adjoint, Refused> {
     let size = film.crop.map_or([film.width, film.height], |c| [c[2], c[3]]);
     let left_out = left_out(scene);
     let all = scene.lights.clone();
-    let groups = all.groups(GROUPS);
+    let groups = all.apart(GROUPS);
     let effort =
         Effort { renders: effort.renders.max(2), time: effort.time.map(|t| t / groups.len().max(1) as u32), ..effort.clone() };
     let lit: Result<Vec<Lit>, Refused> = groups
         .iter()
         .map(|group| {
-            scene.lights = all.only(group);
+            scene.lights = all.only(&scene.geometry, group);
             lit(scene, names(&all, group), &effort)
         })
         .collect();

@@ -1,7 +1,6 @@
 //! Emitters from their descriptions: checked, classified, given power and probability.
 
 use super::area::Area;
-use super::choice::Choice;
 use super::envmap::{Envmap, MIN_SIZE};
 use super::parallel::Parallel;
 use super::point::Point;
@@ -58,29 +57,22 @@ impl Lights {
         // Room for rounding at the rim, and something for an empty scene.
         let radius = if radius > 0.0 { radius * (1.0 + 1e-4) } else { 1.0 };
         let mut lights = Self { center, radius, p_across: 1.0 / (PI * radius * radius), ..Self::default() };
-        let mut powers = vec![];
         for (shape, emission) in areas {
             let (emitter, power) = lights.area(*shape, emission, images, geometry, problems);
-            powers.push(lights.push(emitter, "area", &emission.id, power, emission.place, problems));
+            lights.push(emitter, "area", &emission.id, power, emission.place, problems);
         }
         for other in others {
             if let EmitterModel::Ambient { radiance } = &other.model {
                 lights.ambient.push((EmitterId(lights.emitters.len() as u32), colour(*radiance)));
             }
             let (emitter, power) = lights.other(other, images, problems);
-            powers.push(lights.push(emitter, kind_of(&other.model), &other.id, power, other.place, problems));
+            lights.push(emitter, kind_of(&other.model), &other.id, power, other.place, problems);
         }
-        lights.choice = Choice::new(&powers, lights.p_across, |i| lights.bound(i, powers[i], geometry));
-        if let Some(choice) = &lights.choice {
-            for (i, info) in lights.infos.iter_mut().enumerate() {
-                info.prob_next_event = choice.next_event.prob_anywhere(i);
-                info.prob_emission = choice.emission.prob(i);
-            }
-        }
+        lights.choose(geometry);
         lights
     }
 
-    /// Appends an emitter; its power as one number, 0 for one that is never chosen.
+    /// Appends an emitter, a dark one where it has no effect.
     fn push(
         &mut self,
         emitter: Emitter,
@@ -89,7 +81,7 @@ impl Lights {
         power: Spectrum,
         place: Place,
         problems: &mut Problems,
-    ) -> f64 {
+    ) {
         let mut share = f64::from(power.mean());
         if !power.is_finite() || power.0.min_element() < 0.0 {
             problems.error(place, format!("the {kind} emitter's power is negative or not finite")).hint("check its numbers");
@@ -110,11 +102,10 @@ impl Lights {
             prob_emission: 0.0,
             place,
         });
-        share
     }
 
     /// What bounds the light of a finite emitter of so much power.
-    fn bound(&self, i: usize, power: f64, geometry: &Geometry) -> Option<Bound> {
+    pub(super) fn bound(&self, i: usize, power: f64, geometry: &Geometry) -> Option<Bound> {
         match &self.emitters[i] {
             Emitter::Area(area) => Some(Bound::area(&geometry.extent(area.shape)?, power)),
             Emitter::Point(point) => Some(Bound::point(point, power)),

@@ -3,10 +3,11 @@
 use super::choice::Choice;
 use super::{Emitter, Lights};
 use crate::scene::EmitterId;
+use crate::scene::geometry::Geometry;
 
 impl Lights {
     /// These emitters as they are, the others dark.
-    pub fn only(&self, kept: &[EmitterId]) -> Self {
+    pub fn only(&self, geometry: &Geometry, kept: &[EmitterId]) -> Self {
         let mut lights = self.clone();
         lights.skies.retain(|id| kept.contains(id));
         lights.ambient.retain(|(id, _)| kept.contains(id));
@@ -15,13 +16,13 @@ impl Lights {
                 (*emitter, info.power) = (Emitter::Dark, [0.0; 3]);
             }
         }
-        lights.choose();
+        lights.choose(geometry);
         lights
     }
 
     /// The strongest emitters, `most − 1` at most, each on its own, and all others together; those that are
     /// dark are in none.
-    pub fn groups(&self, most: usize) -> Vec<Vec<EmitterId>> {
+    pub fn apart(&self, most: usize) -> Vec<Vec<EmitterId>> {
         let power = |i: &usize| self.infos[*i].power.iter().sum::<f32>();
         let lit = |i: &usize| !matches!(self.emitters[*i], Emitter::Dark);
         let mut order: Vec<usize> = (0..self.emitters.len()).filter(lit).collect();
@@ -33,15 +34,15 @@ impl Lights {
     }
 
     /// Decides how often each emitter is chosen, by their powers.
-    pub(super) fn choose(&mut self) {
+    pub(super) fn choose(&mut self, geometry: &Geometry) {
         let power = |(emitter, info): (&Emitter, &super::EmitterInfo)| match emitter {
             Emitter::Dark => 0.0,
             _ => info.power.iter().map(|p| f64::from(*p)).sum::<f64>() / 3.0,
         };
         let powers: Vec<f64> = self.emitters.iter().zip(&self.infos).map(power).collect();
-        self.choice = Choice::new(&powers);
+        self.choice = Choice::new(&powers, self.p_across, |i| self.bound(i, powers[i], geometry));
         for (i, info) in self.infos.iter_mut().enumerate() {
-            info.prob_next_event = self.choice.as_ref().map_or(0.0, |c| c.next_event.prob(i));
+            info.prob_next_event = self.choice.as_ref().map_or(0.0, |c| c.next_event.prob_anywhere(i));
             info.prob_emission = self.choice.as_ref().map_or(0.0, |c| c.emission.prob(i));
         }
     }
