@@ -73,10 +73,14 @@ const PLASTICS: &str = r#"
 <shape type="cube"><transform name="to_world"><scale value="0.2"/><translate x="0" y="-0.8" z="0.5"/></transform>
   <bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="diffuse"/><bsdf type="conductor"><string name="material" value="none"/></bsdf></bsdf></shape>"#;
 
-/// A sphere and a tube that shine, and one that shines inwards.
+/// A sphere and a tube that shine.
 const LAMPS: &str = r#"
 <shape type="sphere"><point name="center" value="-0.6, 0.3, 0.1"/><float name="radius" value="0.1"/><emitter type="area"><rgb name="radiance" value="4, 6, 8"/></emitter></shape>
-<shape type="cylinder"><point name="p0" value="0.5, -0.95, -0.5"/><point name="p1" value="0.6, -0.2, -0.6"/><float name="radius" value="0.05"/><emitter type="area"><rgb name="radiance" value="6, 3, 2"/></emitter></shape>
+<shape type="cylinder"><point name="p0" value="0.5, -0.95, -0.5"/><point name="p1" value="0.6, -0.2, -0.6"/><float name="radius" value="0.05"/><emitter type="area"><rgb name="radiance" value="6, 3, 2"/></emitter></shape>"#;
+
+/// One that shines inwards. Grazing light leaves it by an edge so short that the reference of weights, which takes
+/// directions from positions, has no digits left; so it stands where other joins outweigh that.
+const INWARD: &str = r#"
 <shape type="sphere"><point name="center" value="0.75, 0.5, 0.3"/><float name="radius" value="0.1"/><boolean name="flip_normals" value="true"/><bsdf type="null"/><emitter type="area"><rgb name="radiance" value="3, 3, 3"/></emitter></shape>"#;
 
 const SPOTS: &str = r#"<emitter type="spot"><rgb name="intensity" value="3, 5, 6"/><float name="cutoff_angle" value="110"/><float name="beam_width" value="60"/>
@@ -164,7 +168,7 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
     let directional = r#"<emitter type="directional"><vector name="direction" value="0.4, -1, -0.6"/><rgb name="irradiance" value="3, 2.7, 2"/></emitter>"#;
     let sun = r#"<emitter type="directional"><vector name="direction" value="0.4, -1, -0.6"/><rgb name="irradiance" value="3, 2.7, 2"/><float name="angular_diameter" value="30"/></emitter>"#;
     let constant = r#"<emitter type="constant"><rgb name="radiance" value="0.5, 0.6, 0.8"/></emitter>"#;
-    let lamps = format!("{}{}{point}{spot}{SPOTS}{constant}", tiles(4, 3, 0.45), LAMPS);
+    let lamps = format!("{}{LAMPS}{INWARD}{point}{spot}{SPOTS}{constant}", tiles(4, 3, 0.45));
     vec![
         scene("diffuse box", CAMERA, FILM, &[CEILING, AREA, BLOCK]),
         scene("glass and mirror", CAMERA, FILM, &[CEILING, AREA, GLASS_AND_MIRROR]),
