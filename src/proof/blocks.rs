@@ -215,12 +215,17 @@ pub(super) struct Top {
     values: Vec<f32>,
     /// The least of them once there are enough.
     least: f32,
+    /// Contributions in all.
+    count: usize,
 }
 
 impl Top {
     const KEPT: usize = 128;
+    /// So few tell nothing of a tail.
+    const FEW: usize = 16;
 
     pub(super) fn add(&mut self, value: f32) {
+        self.count += 1;
         if value <= self.least {
             return;
         }
@@ -231,6 +236,7 @@ impl Top {
     }
 
     pub(super) fn join(&mut self, other: &Self) {
+        self.count += other.count;
         self.values.extend(&other.values);
         self.trim();
     }
@@ -246,9 +252,11 @@ impl Top {
     /// The largest, if the sums have a variance at all: where the tail falls off as x^(−1/k), that takes
     /// k < 1/2. k is estimated by the mean logarithm of the largest over the least of them [Hill 1975].
     pub(super) fn trusted(&self) -> Option<f64> {
-        let (first, last) = (f64::from(*self.values.first()?), f64::from(*self.values.last()?));
-        let k = self.values.iter().map(|v| (f64::from(*v) / last).ln()).sum::<f64>() / self.values.len() as f64;
-        (self.values.len() < Self::KEPT || k < 0.5).then_some(first)
+        // A tenth of all is tail; more would tell of the middle.
+        let tail = (self.count / 10).clamp(Self::FEW, Self::KEPT).min(self.values.len());
+        let (first, last) = (f64::from(*self.values.first()?), f64::from(self.values[tail - 1]));
+        let k = self.values[..tail].iter().map(|v| (f64::from(*v) / last).ln()).sum::<f64>() / tail as f64;
+        (tail < Self::FEW || k < 0.5).then_some(first)
     }
 }
 
