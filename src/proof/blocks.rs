@@ -220,7 +220,7 @@ pub(super) struct Top {
 }
 
 impl Top {
-    const KEPT: usize = 128;
+    const KEPT: usize = 32;
     /// So few tell nothing of a tail.
     const FEW: usize = 16;
 
