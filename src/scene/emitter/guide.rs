@@ -11,7 +11,7 @@
 //! | point, spot | direction of travel | the emitter's own |
 //! | parallel, sky | place on the disk across the direction of travel | 1/πR² |
 //!
-//! and the probability of choosing each emitter. Where there are more than [`MOST_SQUARES`], a light path or
+//! and the probability of choosing each emitter. Where there are more than 64, a light path or
 //! two from each would teach nothing but noise: emitters that are close to each other and alike (nodes of
 //! the tree of next events) then learn as one, and share what falls to them as without a guide. The unguided density is always mixed in
 //! ([`UNGUIDED`]), so that no path is lost and no contribution grows by more than its inverse. What the
