@@ -220,8 +220,8 @@ pub(super) struct Top {
 }
 
 impl Top {
-    const KEPT: usize = 32;
-    /// So few tell nothing of a tail.
+    const KEPT: usize = 128;
+    /// The shortest tail that tells anything.
     const FEW: usize = 16;
 
     pub(super) fn add(&mut self, value: f32) {
@@ -256,7 +256,7 @@ impl Top {
         let tail = (self.count / 10).clamp(Self::FEW, Self::KEPT).min(self.values.len());
         let (first, last) = (f64::from(*self.values.first()?), f64::from(self.values[tail - 1]));
         let k = self.values[..tail].iter().map(|v| (f64::from(*v) / last).ln()).sum::<f64>() / tail as f64;
-        (tail < Self::FEW || k < 0.5).then_some(first)
+        (self.values.len() < Self::KEPT || k < 0.5).then_some(first)
     }
 }
 
