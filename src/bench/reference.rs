@@ -16,6 +16,7 @@ use crate::report::Picture;
 use crate::report::coverage::Coverage;
 use crate::report::measures::relative_variance;
 use crate::scene::Scene;
+use crate::transport::settings::Techniques;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -46,10 +47,11 @@ pub fn reference(
         return read(subject, path).map(|picture| Some(Reference::new(picture, format!("given: {}", path.display()))));
     }
     let path = place(subject);
-    if let Some(kept) = kept(subject, &path, effort) {
+    let options = suited(subject.scene).map_err(|e| e.to_string())?;
+    if let Some(kept) = kept(subject, &path, effort, options.settings.techniques) {
         return Ok(Some(kept));
     }
-    make(subject, &path, effort, stop)
+    make(subject, &path, effort, options, stop)
 }
 
 /// Where the reference of a scene is kept.
@@ -76,9 +78,9 @@ fn read(subject: &Subject<'_>, path: &Path) -> Result<Picture, String> {
 }
 
 /// The one that is there, if it is as good as wanted or took as long as allowed.
-fn kept(subject: &Subject<'_>, path: &Path, effort: &Effort) -> Option<Reference> {
+fn kept(subject: &Subject<'_>, path: &Path, effort: &Effort, techniques: Techniques) -> Option<Reference> {
     let file = read_image(path).ok()?;
-    if file.attributes.get("techniques")? != &suited(subject.scene).ok()?.settings.techniques.names() {
+    if *file.attributes.get("techniques")? != techniques.names() {
         return None;
     }
     let seconds: f64 = file.attributes.get("renderTime")?.parse().ok()?;
@@ -97,8 +99,13 @@ fn suited(scene: &Scene) -> Result<Options, RenderError> {
     Ok(options)
 }
 
-fn make(subject: &Subject<'_>, path: &Path, effort: &Effort, stop: Stop<'_>) -> Result<Option<Reference>, String> {
-    let mut options = suited(subject.scene).map_err(|e| e.to_string())?;
+fn make(
+    subject: &Subject<'_>,
+    path: &Path,
+    effort: &Effort,
+    mut options: Options,
+    stop: Stop<'_>,
+) -> Result<Option<Reference>, String> {
     options.settings.seed = effort.seed ^ SEED;
     let begin = Instant::now();
     let mut render = Render::new(subject.scene, &options).map_err(|e| e.to_string())?;
