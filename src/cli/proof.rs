@@ -96,7 +96,7 @@ pub fn explain(args: &ExplainArgs) -> Result<Exit, Failure> {
     };
     let emitters = opened.scene.lights.infos();
     let emitter = |i: u32| match emitters.get(i as usize) {
-        Some(e) => format!("{}{}", e.kind, e.id.as_deref().map_or(String::new(), |id| format!(" `{id}`"))),
+        Some(e) => e.name(),
         None => format!("emitter {i}"),
     };
     say(&found.to_text(shape, emitter));

@@ -157,9 +157,8 @@ pub fn adjoint(scene: &mut Scene, effort: &Effort) -> Result<Adjoint, Refused> {
 /// Emitters as people know them.
 fn names(lights: &Lights, group: &[EmitterId]) -> String {
     let infos = group.iter().filter_map(|id| lights.infos().get(id.0 as usize));
-    let name = |e: &EmitterInfo| e.id.as_ref().map_or(e.kind.to_owned(), |id| format!("{} `{id}`", e.kind));
     match group.len() {
-        0..=3 => infos.map(name).collect::<Vec<_>>().join(", "),
+        0..=3 => infos.map(EmitterInfo::name).collect::<Vec<_>>().join(", "),
         n => format!("{n} emitters"),
     }
 }

@@ -39,6 +39,13 @@ pub struct EmitterInfo {
     pub place: Place,
 }
 
+impl EmitterInfo {
+    /// Kind and, if it has one, `id`: as people know it.
+    pub fn name(&self) -> String {
+        self.id.as_ref().map_or_else(|| self.kind.to_owned(), |id| format!("{} `{id}`", self.kind))
+    }
+}
+
 /// Below this full angle directions in single precision have no place for a disk: parallel light.
 const LEAST_DISK_DEG: f32 = 0.002;
 
@@ -82,14 +89,14 @@ impl Lights {
         place: Place,
         problems: &mut Problems,
     ) {
-        let mut share = f64::from(power.mean());
+        let mut lit = power.mean() > 0.0;
         if !power.is_finite() || power.0.min_element() < 0.0 {
             problems.error(place, format!("the {kind} emitter's power is negative or not finite")).hint("check its numbers");
-            share = 0.0;
-        } else if share == 0.0 && !matches!(emitter, Emitter::Dark) {
+            lit = false;
+        } else if !lit && !matches!(emitter, Emitter::Dark) {
             problems.warning(place, format!("the {kind} emitter is black and has no effect"));
         }
-        let emitter = if share > 0.0 { emitter } else { Emitter::Dark };
+        let emitter = if lit { emitter } else { Emitter::Dark };
         if matches!(emitter, Emitter::Sky(_)) {
             self.skies.push(EmitterId(self.emitters.len() as u32));
         }

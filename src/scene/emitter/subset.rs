@@ -9,10 +9,12 @@ impl Lights {
     /// These emitters as they are, the others dark.
     pub fn only(&self, geometry: &Geometry, kept: &[EmitterId]) -> Self {
         let mut lights = self.clone();
-        lights.skies.retain(|id| kept.contains(id));
-        lights.ambient.retain(|(id, _)| kept.contains(id));
-        for (i, (emitter, info)) in lights.emitters.iter_mut().zip(&mut lights.infos).enumerate() {
-            if !kept.contains(&EmitterId(i as u32)) {
+        let mut on = vec![false; lights.emitters.len()];
+        kept.iter().for_each(|id| on[id.0 as usize] = true);
+        lights.skies.retain(|id| on[id.0 as usize]);
+        lights.ambient.retain(|(id, _)| on[id.0 as usize]);
+        for ((emitter, info), on) in lights.emitters.iter_mut().zip(&mut lights.infos).zip(on) {
+            if !on {
                 (*emitter, info.power) = (Emitter::Dark, [0.0; 3]);
             }
         }
