@@ -254,7 +254,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKe
     if plan.c > 0.0 {
         for i in 1..k.saturating_sub(1) {
             if !d.delta[i] && !d.delta[i + 1] {
-                let merged = |i: usize| if i > 1 && i + 1 < k && merges_at(d, i, eta) { h.raise(eta) } else { 0.0 };
+                let merged = |i: usize| if merges_at(d, i, eta) { h.raise(eta) } else { 0.0 };
                 let (k_i, h_next) = (k_at(i) + merged(i), h_at(i + 1) + merged(i + 1));
                 let w = mis::connect(h, c, d.s[i], k_i, d.g[i + 1], h_next);
                 joins.push(((Technique::Connect, k - i), w));
