@@ -44,8 +44,8 @@ const LESS_MUST_WIN: f64 = 1.02;
 /// A single path counts for at most so many times the mean.
 const MOST: f64 = 300.0;
 
-/// Cost of operations, in units of a step of a gathering walk. Estimates from the profile of a few scenes;
-/// only ratios matter, and only as far as they change the order of candidates.
+/// Cost of operations, in units of a step of a gathering walk: user time of passes of five scenes with and
+/// without each join, divided by its counts. Only ratios matter, and only as far as they change the order of candidates.
 struct Costs {
     gather_walk: f64,
     gather_step: f64,
