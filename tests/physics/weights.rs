@@ -6,7 +6,6 @@ use glam::Vec2;
 use nephroid::math::Random;
 use nephroid::math::random::Family;
 use nephroid::scene::emitter::Guide;
-use nephroid::transport::RayCounts;
 use nephroid::transport::cache::LightCache;
 use nephroid::transport::gather::gather;
 use nephroid::transport::mis::Heuristic;
@@ -14,6 +13,7 @@ use nephroid::transport::reference::{Densities, Testimony, Witness, weights, wei
 use nephroid::transport::settings::{Plan, Settings, Techniques};
 use nephroid::transport::shoot::shoot;
 use nephroid::transport::walk::{Context, Tally};
+use nephroid::transport::{RayCounts, Technique};
 
 /// Random densities of a random path, as a brute-force oracle for the algebra.
 fn random_path(random: &mut Random) -> (Densities, Plan) {
@@ -100,27 +100,33 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
     (world, plan, witness.seen)
 }
 
+/// What is wrong with the weights of walks: those that are more than 1e-3 from their definition.
+fn differing(world: &nephroid::scene::Scene, plan: &Plan, seen: &[Testimony]) -> Vec<String> {
+    let mut bad = Vec::new();
+    for t in seen {
+        let all = t.path.weights(Context::new(world, plan, 0));
+        let sum: f64 = all.iter().map(|w| w.1).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "weights sum to {sum}");
+        let Some((_, w)) = all.iter().find(|w| w.0 == t.key) else {
+            bad.push(format!("{:?} is no join of its path {all:?}", t.key));
+            continue;
+        };
+        assert!(t.weight.is_finite());
+        let tolerance = 1e-3 * w.max(1e-6);
+        if *w > 1e-6 && (f64::from(t.weight) - w).abs() > tolerance {
+            bad.push(format!("{:?} k = {}: {} instead of {w}; all {all:?}", t.key, t.path.vertices.len() + 1, t.weight));
+        }
+    }
+    bad
+}
+
 /// At most one weight in `rare` may differ by more than 1e-3.
 fn walks_use_the_defined_weights(settings: &Settings, per_scene: usize, rare: usize) -> usize {
     let dir = tempfile::tempdir().unwrap();
     let mut tested = 0;
     for s in scenes::all(dir.path()) {
         let (world, plan, seen) = testimonies(&s.xml, settings, per_scene);
-        let mut bad = Vec::new();
-        for t in &seen {
-            let all = t.path.weights(Context::new(&world, &plan, 0));
-            let sum: f64 = all.iter().map(|w| w.1).sum();
-            assert!((sum - 1.0).abs() < 1e-9, "{}: weights sum to {sum}", s.name);
-            let Some((_, w)) = all.iter().find(|w| w.0 == t.key) else {
-                bad.push(format!("{:?} is no join of its path {all:?}", t.key));
-                continue;
-            };
-            assert!(t.weight.is_finite());
-            let tolerance = 1e-3 * w.max(1e-6);
-            if *w > 1e-6 && (f64::from(t.weight) - w).abs() > tolerance {
-                bad.push(format!("{:?} k = {}: {} instead of {w}; all {all:?}", t.key, t.path.vertices.len() + 1, t.weight));
-            }
-        }
+        let bad = differing(&world, &plan, &seen);
         tested += seen.len();
         // The reference takes directions from f32 positions, which lose digits on short or grazing edges.
         assert!(
@@ -153,6 +159,25 @@ fn walks_use_the_defined_weights_with_the_power_heuristic_and_without_some_joins
         };
         walks_use_the_defined_weights(&settings, 1000, 200);
     }
+}
+
+/// A connection between nearly specular vertices shares its path with a merge at either end.
+#[test]
+fn connections_know_the_merges_at_their_ends() {
+    let dir = tempfile::tempdir().unwrap();
+    let settings = Settings {
+        techniques: Techniques::parse("connect,merge").unwrap(),
+        merge_radius: Some(0.2),
+        max_length: 6,
+        guided: false,
+        ..Settings::default()
+    };
+    let (world, plan, mut seen) = testimonies(&scenes::named(dir.path(), "nearly specular"), &settings, 20_000);
+    let merged = |t: &Testimony| t.path.weights(Context::new(&world, &plan, 0)).iter().any(|w| w.0.0 == Technique::Merge);
+    seen.retain(|t| t.key.0 == Technique::Connect && merged(t));
+    let bad = differing(&world, &plan, &seen);
+    assert!(seen.len() > 100, "{} connections", seen.len());
+    assert!(bad.len() * 50 <= seen.len(), "{} of {}: {}", bad.len(), seen.len(), bad[..bad.len().min(5)].join("\n"));
 }
 
 /// The two vertices of a merge are some distance apart, so the walks know densities at one of them and
