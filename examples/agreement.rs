@@ -41,7 +41,7 @@ fn series(
         draws.push(sums.iter().zip(&before).map(|(s, b)| (s - b) / passes as f64).collect());
         before = sums;
     }
-    Ok(BlockSeries { columns, rows, draws, largest: 0.0 })
+    Ok(BlockSeries { columns, rows, draws, ..BlockSeries::default() })
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -8,16 +8,18 @@
 //! Each side is drawn many times independently. Blocks of 16 × 16 pixels and the whole film are compared
 //! by Welch's test, corrected for their number within a length and for the number of lengths
 //! [Šidák 1967]. Paths that a walker finds by luck are compared apart from those it always finds
-//! ([`super::blocks`]), so that what is rarely found is not taken for what is never found. A mean of few effective draws is not tested: either side gets more passes until
-//! nearly all energy can be, or the time is over; the share that was is part of the verdict. Classes of
-//! next to no energy are not tested: what has not been found yet may be as large as what has. For the same
+//! ([`super::blocks`]), so that what is rarely found is not taken for what is never found. A mean of few
+//! effective draws is not tested: either side gets more passes until nearly all energy can be, or the time is
+//! over; the share that was is part of the verdict, and the share where a few of the largest contributions
+//! had to be allowed for ([`crate::report::agreement`]). Classes of next to no energy are not tested: what
+//! has not been found yet may be as large as what has. For the same
 //! reason each light is tested on its own: a sky is gathered always and a small sun by luck, for shooting it
 //! is the other way round, and their sum would hide both.
 
 use super::blocks::{self, Series};
 use super::compare::{Estimate, compare, sides_text, worst};
 use crate::render::{Estimator, Options, RenderError};
-use crate::report::agreement::{Agreement, BlockSeries, agreement};
+use crate::report::agreement::{Agreement, BlockSeries, UNSEEN, agreement};
 use crate::report::coverage::{Blind, Coverage};
 use crate::scene::emitter::{EmitterInfo, Lights};
 use crate::scene::{EmitterId, Scene};
@@ -125,6 +127,8 @@ pub struct Adjoint {
     pub left_out: Vec<Blind>,
     /// Share of the energy of the classes both can make that was tested.
     pub energy_tested: f64,
+    /// Share of it, of that, which was tested with an allowance for large contributions that may be due.
+    pub energy_allowed: f64,
     /// Corrected over all lengths and lights.
     pub p: f64,
     /// p is at least [`ALPHA`].
@@ -150,8 +154,11 @@ pub fn adjoint(scene: &mut Scene, effort: &Effort) -> Result<Adjoint, Refused> {
     scene.lights = all;
     let lit = lit?;
     let p = worst(&lit.iter().map(|l| l.p).collect::<Vec<_>>());
-    let energy_tested = share(lit.iter().flat_map(|l| &l.terms).flat_map(|t| &t.classes));
-    Ok(Adjoint { size, renders: effort.renders, lit, left_out, energy_tested, p, agree: p >= ALPHA })
+    let classes = || lit.iter().flat_map(|l| &l.terms).flat_map(|t| &t.classes);
+    let energy_tested = share(classes(), |c| c.blocks.energy_tested).unwrap_or(1.0);
+    let energy_allowed = share(classes(), |c| c.blocks.energy_allowed).unwrap_or(0.0);
+    let renders = effort.renders;
+    Ok(Adjoint { size, renders, left_out, energy_tested, energy_allowed, p, agree: p >= ALPHA, lit })
 }
 
 /// Emitters as people know them.
@@ -239,7 +246,7 @@ fn lacking(sides: &[Series<'_>], lengths: std::ops::Range<usize>) -> [bool; 2] {
                 agreement(&s, &s)
             });
             let energy = with_itself.iter().map(|a| a.totals.0).fold(0.0, f64::max);
-            (energy, with_itself.map(|a| if a.totals.0 > 0.0 { a.energy_tested } else { 0.0 }))
+            (energy, with_itself.map(|a| if a.totals.0 > 0.0 { a.energy_tested - a.energy_allowed } else { 0.0 }))
         })
         .collect();
     let total: f64 = classes.iter().map(|(energy, _)| energy).sum();
@@ -249,14 +256,15 @@ fn lacking(sides: &[Series<'_>], lengths: std::ops::Range<usize>) -> [bool; 2] {
     })
 }
 
-fn share<'a>(classes: impl Iterator<Item = &'a Class>) -> f64 {
+/// Share of the energy of all classes that is this part of each, `None` where there is no energy.
+fn share<'a>(classes: impl Iterator<Item = &'a Class>, part: impl Fn(&Class) -> f64) -> Option<f64> {
     let (mut all, mut tested) = (0.0, 0.0);
     for c in classes {
         let energy = c.gather.mean.max(c.shoot.mean);
         all += energy;
-        tested += energy * c.blocks.energy_tested;
+        tested += energy * part(c);
     }
-    if all > 0.0 { tested / all } else { 1.0 }
+    (all > 0.0).then(|| tested / all)
 }
 
 /// Tested if it has at least the energy `least`.
@@ -276,7 +284,8 @@ fn term(length: usize, sides: &[Series<'_>], least: f64) -> Term {
         .collect();
     let tested: Vec<f64> = classes.iter().filter(|c| c.tests() > 0).map(|c| c.p).collect();
     let p = worst(&tested);
-    Term { n: length as u32 - 1, gather, shoot, z: gather.z(shoot), p, energy_tested: share(classes.iter()), classes }
+    let energy_tested = share(classes.iter(), |c| c.blocks.energy_tested).unwrap_or(1.0);
+    Term { n: length as u32 - 1, gather, shoot, z: gather.z(shoot), p, energy_tested, classes }
 }
 
 /// Draws of all classes of a length together.
@@ -358,6 +367,14 @@ impl Adjoint {
             self.p,
             100.0 * self.energy_tested
         );
+        if self.energy_allowed > 0.0 {
+            let _ = writeln!(
+                out,
+                "({:.1} % of it with an allowance: {} more contributions as large as the largest would not count)",
+                100.0 * self.energy_allowed,
+                UNSEEN
+            );
+        }
         out
     }
 }

@@ -194,7 +194,8 @@ impl<'a> Series<'a> {
             columns: self.columns,
             rows: self.rows,
             draws,
-            largest: self.tops[class].trusted().map_or(f64::INFINITY, |w| w * scale),
+            largest: self.tops[class].largest() * scale,
+            heavy: self.tops[class].heavy(),
         }
     }
 }
@@ -249,14 +250,19 @@ impl Top {
         }
     }
 
-    /// The largest, if the sums have a variance at all: where the tail falls off as x^(−1/k), that takes
-    /// k < 1/2. k is estimated by the mean logarithm of the largest over the least of them [Hill 1975].
-    pub(super) fn trusted(&self) -> Option<f64> {
+    /// The largest, 0 where nothing was found.
+    pub(super) fn largest(&self) -> f64 {
+        self.values.first().map_or(0.0, |v| f64::from(*v))
+    }
+
+    /// Whether the sums have no variance: where the tail falls off as x^(−1/k), that takes k < 1/2.
+    /// k is estimated by the mean logarithm of the largest over the least of them [Hill 1975].
+    pub(super) fn heavy(&self) -> bool {
         // A tenth of all is tail; more would tell of the middle.
         let tail = (self.count / 10).clamp(Self::FEW, Self::KEPT).min(self.values.len());
-        let (first, last) = (f64::from(*self.values.first()?), f64::from(self.values[tail - 1]));
+        let Some(last) = self.values[..tail].last().map(|v| f64::from(*v)) else { return false };
         let k = self.values[..tail].iter().map(|v| (f64::from(*v) / last).ln()).sum::<f64>() / tail as f64;
-        (self.values.len() < Self::KEPT || k < 0.5).then_some(first)
+        self.values.len() >= Self::KEPT && k >= 0.5
     }
 }
 

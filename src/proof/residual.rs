@@ -300,10 +300,8 @@ impl<'a> Test<'a> {
             columns: 1,
             rows: 1,
             draws: (0..draws).map(|d| vec![sums().map(|s| s.draws[d]).sum::<f64>() * scale]).collect(),
-            largest: sums()
-                .map(|s| s.top.trusted().unwrap_or(if s.draws.iter().all(|d| *d == 0.0) { 0.0 } else { f64::INFINITY }))
-                .fold(0.0, f64::max)
-                * scale,
+            largest: sums().map(|s| s.top.largest()).fold(0.0, f64::max) * scale,
+            heavy: sums().any(|s| s.top.heavy()),
         }
     }
 
@@ -330,8 +328,7 @@ impl<'a> Test<'a> {
             }
         }
         // Those whose draws may have no variance must not spoil the others.
-        let (calm, wild): (Vec<usize>, Vec<usize>) =
-            rest.into_iter().partition(|p| sides(&[*p]).iter().all(|s| s.largest.is_finite()));
+        let (calm, wild): (Vec<usize>, Vec<usize>) = rest.into_iter().partition(|p| sides(&[*p]).iter().all(|s| !s.heavy));
         for rest in [calm, wild].iter().filter(|r| !r.is_empty()) {
             add(rest);
         }

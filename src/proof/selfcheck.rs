@@ -212,7 +212,7 @@ fn constant_radiance() -> Rows {
         (&mixed, Estimator::Bidirectional, "diffuse, mirror and glass"),
         (&diffuse, Estimator::Shoot, "diffuse"),
     ] {
-        rows.push(constant("A16", format!("radiance 1 everywhere ({what})"), world, estimator, (1, u32::MAX), 1.0)?);
+        rows.push(constant("A16", format!("radiance 1 everywhere ({what})"), world, estimator, (1, u32::MAX), 1.0, 256)?);
     }
     Ok(rows)
 }
@@ -225,8 +225,9 @@ fn constant(
     estimator: Estimator,
     lengths: (u32, u32),
     exact: f64,
+    passes: u64,
 ) -> Result<Row, Refused> {
-    let picture = picture(world, &options(world, estimator, lengths), 256)?;
+    let picture = picture(world, &options(world, estimator, lengths), passes)?;
     let p = Constancy::of(&picture, [exact; 3]).p;
     Ok(Row::new(theory, format!("{what} by {}: p of all pixels", estimator.name()), p, Rule::AtLeast(ALPHA)))
 }
@@ -243,10 +244,10 @@ fn constant_reflected_radiance() -> Rows {
             rows.push(Row::mean("A17", what, film_mean(&world, &o, 64)?, exact));
         }
     }
-    // A pixel has too few splats for its mean to be normal.
-    for estimator in [Estimator::Gather, Estimator::Bidirectional] {
+    // Few splats fall on a pixel in a pass.
+    for (estimator, passes) in [(Estimator::Gather, 256), (Estimator::Shoot, 8192), (Estimator::Bidirectional, 256)] {
         let exact = SPHERE_ALBEDO * SPHERE_EMISSION;
-        rows.push(constant("A17", "sphere with lamps, n = 1".into(), &world, estimator, (2, 2), exact)?);
+        rows.push(constant("A17", "sphere with lamps, n = 1".into(), &world, estimator, (2, 2), exact, passes)?);
     }
     Ok(rows)
 }
@@ -345,7 +346,7 @@ pub fn mesh(path: &Path) -> Rows {
         (&mirror, Estimator::Gather, "a mirror"),
         (&mirror, Estimator::Bidirectional, "a mirror"),
     ] {
-        rows.push(constant("A16", format!("radiance 1 around the mesh, {what},"), world, estimator, (1, u32::MAX), 1.0)?);
+        rows.push(constant("A16", format!("radiance 1 around the mesh, {what},"), world, estimator, (1, u32::MAX), 1.0, 256)?);
     }
     Ok(rows)
 }

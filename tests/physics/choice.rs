@@ -78,7 +78,7 @@ fn blocks(world: &Scene, renders: u64, options: impl Fn(u64) -> Options) -> Bloc
         }
         sums
     };
-    BlockSeries { columns, rows, draws: (0..renders).map(draw).collect(), largest: 0.0 }
+    BlockSeries { columns, rows, draws: (0..renders).map(draw).collect(), ..BlockSeries::default() }
 }
 
 /// Each render has its own pilot, choice and guide; merges, which are biased, are not among the joins.

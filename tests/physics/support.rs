@@ -119,6 +119,6 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
         })
         .collect();
     (0..=effort.max_length as usize)
-        .map(|k| BlockSeries { columns, rows, draws: renders.iter().map(|r| r[k].clone()).collect(), largest: 0.0 })
+        .map(|k| BlockSeries { columns, rows, draws: renders.iter().map(|r| r[k].clone()).collect(), ..BlockSeries::default() })
         .collect()
 }
