@@ -145,6 +145,29 @@ fn planted_mistakes_spoil_merges() {
     assert!(sound < 1.0 && mistaken > 1.0, "{sound} {mistaken}");
 }
 
+/// `chains::branches_find_what_walks_find` notices light that is found twice.
+#[test]
+fn planted_mistakes_double_chains() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), "glass and mirror"));
+    let chains = |branching, seed| {
+        let techniques = Techniques::parse("hit").unwrap();
+        let paths = PathFilter::parse("E S+ L").unwrap();
+        let settings = Settings { techniques, paths, branching, seed, ..Settings::default() };
+        series(&world, &settings, Effort { renders: 64, passes: 10, max_length: 5 })
+    };
+    let by_chance = chains(false, seed() * 77 + 1);
+    let [sound, mistaken] = [None, Some(Mutant::ChainTwice)].map(|m| {
+        plant(m);
+        let branched = chains(true, seed() * 77 + 2);
+        plant(None);
+        (2..=5).map(|k| agreement(&by_chance[k], &branched[k]).p).fold(1.0, f64::min)
+    });
+    println!("ChainTwice: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
+    assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
+}
+
 /// The command `adjoint` notices a mistake in either walker.
 #[test]
 fn planted_mistakes_part_the_walkers() {

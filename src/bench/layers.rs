@@ -101,6 +101,11 @@ struct Events {
 }
 
 impl Events {
+    /// So many Dirac events.
+    fn dirac(count: u32) -> Self {
+        Self { count, dirac: count, first_dirac: count > 0, last_dirac: count > 0 }
+    }
+
     fn push(&mut self, dirac: bool) {
         self.first_dirac = if self.count == 0 { dirac } else { self.first_dirac };
         self.last_dirac = dirac;
@@ -393,6 +398,11 @@ impl Observe for Observing<'_, '_> {
     fn scattered(&mut self, s: &Scatter) {
         self.watch.events.push(s.delta);
         self.watch.pending = false;
+    }
+    fn returned(&mut self, vertices: usize) {
+        // What branches is a chain of Dirac events.
+        let events = Events::dirac(vertices as u32);
+        (self.watch.events, self.watch.pending) = (events, false);
     }
     fn cached(&mut self, _: &LightVertex) {
         let before = self.watch.here();

@@ -320,6 +320,9 @@ pub struct TransportArgs {
     /// Let light start as the lamps emit it, not where a pilot found that it matters
     #[arg(long)]
     pub no_guide: bool,
+    /// Let a walk through glass choose at random which way it looks for lamps, instead of following all
+    #[arg(long)]
+    pub no_branching: bool,
     /// How walks draw: evenly spread over their first decisions (the variance that the image reports is
     /// then an upper bound), or independently of each other
     #[arg(long, value_enum, default_value_t, value_name = "NAME")]

@@ -154,6 +154,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     s.light_paths = t.light_paths;
     s.connections = t.connections;
     s.guided = !t.no_guide;
+    s.branching = !t.no_branching;
     s.stratified = t.sampler == SamplerName::Stratified;
     s.seed = args.seed.unwrap_or(opened.scene.seed);
     (estimator, options)
@@ -391,6 +392,7 @@ impl Job<'_> {
             "connections": set.connections,
             "merge_radius": render.plan().merge_radius,
             "guided": set.guided,
+            "branching": set.branching,
             "stratified": set.stratified,
             "seed": set.seed,
             "width": film.width(),

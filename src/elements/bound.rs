@@ -21,7 +21,7 @@ use super::{Rgb, Sources};
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::math::warp::hemisphere_cosine_p_w;
-use crate::scene::emitter::{EmitterPoint, Guide};
+use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::scene::{EmitterId, Scene, Surface};
 use glam::Vec3;
@@ -137,7 +137,7 @@ impl<'a> Probe<'a> {
         let mut sum = self.along(s, n, &ray, None);
         if self.has_lamps {
             let (u_pick, u) = (random.unit(), random.unit2());
-            let ne = self.scene.lights.sample_next_event(&self.scene.geometry, &Guide::default(), s.p, u_pick, u);
+            let ne = self.scene.lights.sample_next_event(&self.scene.geometry, s.p, u_pick, u);
             if let Some(ne) = ne.filter(|ne| !ne.delta && ne.distance.is_finite() && n.dot(ne.w) > 0.0) {
                 let ray = Ray { o: offset_origin(s.p, s.p_error, s.n_g, n), d: ne.w, t_max: f32::INFINITY };
                 let more = self.along(s, n, &ray, Some(ne.point.emitter));

@@ -10,7 +10,7 @@ use super::mesh::{Elements, ray_from};
 use super::{Rgb, factors::Sequence};
 use crate::local::Equation;
 use crate::math::warp::hemisphere_cosine_p_w;
-use crate::scene::emitter::{EmitterPoint, Guide};
+use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::End;
 use crate::scene::{EmitterId, Scene, Surface};
 use crate::spectrum::Spectrum;
@@ -110,9 +110,8 @@ fn white(scene: &Scene, mesh: &Elements, i: usize, others: &[EmitterId], samples
 pub(super) fn white_at(scene: &Scene, s: &Surface, n: Vec3, others: &[EmitterId], u: Vec2, v: Vec2) -> Spectrum {
     let mut sum = Spectrum::BLACK;
     let end: End = (s.p, s.p_error, s.n_g);
-    let guide = Guide::default();
     for id in others {
-        let Some(ne) = scene.lights.next_event_of(*id, &scene.geometry, &guide, s.p, v) else { continue };
+        let Some(ne) = scene.lights.next_event_of(*id, &scene.geometry, s.p, v) else { continue };
         let cos = n.dot(ne.w);
         if cos <= 0.0 {
             continue;

@@ -331,6 +331,9 @@ impl Observe for Ends<'_, '_> {
             *event = Kind::Dirac;
         }
     }
+    fn returned(&mut self, vertices: usize) {
+        self.events.truncate(vertices);
+    }
     fn joined(&mut self, join: Join<'_>) {
         let Some((pixel, value)) = self.found.take() else { return };
         let (first, last) = (self.events.first().copied(), self.events.last().copied());

@@ -228,6 +228,9 @@ impl Observe for Watch<'_> {
     fn scattered(&mut self, s: &Scatter) {
         self.witness.scattered(s);
     }
+    fn returned(&mut self, vertices: usize) {
+        self.witness.returned(vertices);
+    }
     fn joined(&mut self, join: Join<'_>) {
         let Some(weight) = self.seen.take() else { return };
         let value = join.value * weight;

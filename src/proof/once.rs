@@ -14,7 +14,6 @@
 use crate::local::Equation;
 use crate::math::Random;
 use crate::math::warp;
-use crate::scene::emitter::Guide;
 use crate::scene::{EmitterId, Scene, Surface};
 use crate::spectrum::Spectrum;
 use crate::transport::vertex::{Scatter, Vertex};
@@ -108,7 +107,7 @@ pub(super) fn dirac_lights(scene: &Scene, lights: &[EmitterId], vertex: &Vertex<
         let all = lights.len() <= ASKED;
         let id = if all { lights[i] } else { lights[random.below(lights.len() as u32) as usize] };
         let x = &vertex.surface;
-        let next = scene.lights.next_event_of(id, &scene.geometry, &Guide::default(), x.p, random.unit2());
+        let next = scene.lights.next_event_of(id, &scene.geometry, x.p, random.unit2());
         let Some((ne, f)) = next.and_then(|ne| Some((ne, kernel(scene, Equation::Rendering, vertex, ne.w)?))) else { continue };
         if sees_light(scene, x, &ne) {
             sum += f * ne.radiance * (ne.g / ne.nu);

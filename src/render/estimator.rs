@@ -126,7 +126,7 @@ impl Options {
         let mut h = blake3::Hasher::new();
         h.update(&scene.hash());
         h.update(&[t.hit, t.next_event, t.splat, t.connect, t.merge].map(u8::from));
-        let switches = [s.heuristic == Heuristic::Power, s.hide_emitters, s.guided, s.automatic, s.stratified];
+        let switches = [s.heuristic == Heuristic::Power, s.hide_emitters, s.guided, s.automatic, s.stratified, s.branching];
         h.update(&switches.map(u8::from));
         h.update(format!("{:?}", s.coupling).as_bytes());
         for n in [s.min_length, s.max_length, s.rr_depth, s.connections] {

@@ -3,12 +3,14 @@
 //! With hits and next events alone this is path tracing [Kajiya 1986]; with the sums of [`super::mis`]
 //! it is the eye's half of bidirectional path tracing [Veach 1997, ch. 10].
 
+use super::branch::Branch;
 use super::cache::{LightCache, LightVertex};
+use super::chain;
 use super::class::{Finished, Symbol};
 use super::mis::{self, Partial};
 use super::mutant::{Mutant, planted};
 use super::vertex::Vertex;
-use super::walk::{Arrival, Context, Join, Observe, Tally, Walk, end, sees_light, spawn};
+use super::walk::{Arrival, Chain, Context, Join, Observe, Tally, Walk, end, sees_light, spawn};
 use super::{Contribution, Record, Technique};
 use crate::local::Equation;
 use crate::math::Random;
@@ -69,6 +71,7 @@ pub fn follow<R: Record, O: Observe>(
         eta: 1.0,
         class: plan.settings.paths.eye(),
         first_delta: false,
+        chain: if plan.settings.branching { Chain::Single } else { Chain::Ended },
     };
     loop {
         tally.rays.gather += 1;
@@ -105,6 +108,13 @@ pub fn follow<R: Record, O: Observe>(
             if walk.focused && !vertex.focused && cx.merge_radius2 > 0.0 {
                 merge(cx, &walk, &vertex, partial, lights, tally);
             }
+        }
+        if walk.chain == Chain::Single
+            && plan.settings.techniques.hit
+            && vertex.closure.roughness() == 0.0
+            && chain::follow(cx, &walk, &vertex, weight, random, tally)
+        {
+            walk.chain = Chain::Branched;
         }
         let (u, u_lobe) = (random.axis2(), random.axis());
         let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
@@ -178,6 +188,9 @@ fn hit<R: Record, O: Observe>(
     tally: &mut Tally<'_, R, O>,
 ) {
     let (scene, plan) = (cx.scene, cx.plan);
+    if walk.chain == Chain::Branched && !planted(Mutant::ChainTwice) {
+        return;
+    }
     let length = walk.length + 1;
     let weight = if length == 1 {
         1.0
@@ -220,6 +233,40 @@ fn hit<R: Record, O: Observe>(
     finish(cx, path, value, join, 0, tally);
 }
 
+/// A chain of Dirac events arrived on a light: no other join makes its path.
+pub(super) fn chain_hit<R: Record, O: Observe>(
+    cx: Context<'_>,
+    branch: &Branch,
+    point: &EmitterPoint,
+    radiance: Spectrum,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let length = branch.length + 1;
+    if radiance.is_black() || !cx.plan.wants_length(length) {
+        return;
+    }
+    let path = Finished {
+        from_eye: branch.class,
+        from_light: cx.plan.settings.paths.light(),
+        length,
+        first_delta: branch.first_delta,
+        last_delta: branch.last_delta,
+        light_delta: false,
+    };
+    let join = Join {
+        technique: Technique::Hit,
+        weight: 1.0,
+        length,
+        light: Some(point),
+        emitter: point.emitter,
+        light_delta: false,
+        light_vertex: 0,
+        lens: Vec3::ZERO,
+        value: branch.throughput * radiance,
+    };
+    finish(cx, path, join.value, join, 0, tally);
+}
+
 /// Picks a light point from `vertex`.
 #[inline]
 fn next_event<R: Record, O: Observe>(
@@ -237,14 +284,19 @@ fn next_event<R: Record, O: Observe>(
         return;
     }
     let x = &vertex.surface;
-    let Some(mut ne) = scene.lights.sample_next_event(&scene.geometry, &plan.guide, x.p, u_pick, u) else { return };
+    let Some(mut ne) = scene.lights.sample_next_event(&scene.geometry, x.p, u_pick, u) else { return };
     if planted(Mutant::NextEventDensity) {
         ne.nu *= 1.5;
     }
     let Some(k) = vertex.kernel(EQUATION, ne.w) else { return };
     let h = plan.settings.heuristic;
     let g = if plan.settings.techniques.hit && !ne.delta { k.p_w * ne.g } else { 0.0 };
-    let e = if plan.two_sided { ne.emission.p_k * ne.emission.p_next * k.cos_g * ne.inv_d2 } else { 0.0 };
+    let e = if plan.two_sided {
+        let e = scene.lights.density_emission(&scene.geometry, &plan.guide, &ne.point, -ne.w, x.p);
+        e.p_k * e.p_next * k.cos_g * ne.inv_d2
+    } else {
+        0.0
+    };
     let sum = if length == 2 && !plan.splat_direct { 0.0 } else { partial.at(h, k.p_w_rev) };
     let weight = mis::next_event(h, ne.nu, g, e, sum);
     let value = walk.throughput * k.value * ne.radiance * (ne.g / ne.nu * weight);

@@ -18,7 +18,9 @@
 //! - [`cache`], [`merge`]: light vertices kept for connections and merges.
 //! - [`mod@reference`]: the same weights the slow way, for tests.
 
+pub mod branch;
 pub mod cache;
+pub mod chain;
 pub mod class;
 pub mod gather;
 pub mod merge;

@@ -22,6 +22,8 @@ pub enum Mutant {
     MergeCosine = 7,
     /// A walk forgets that a merge was possible at the vertex before.
     MergeWeight = 8,
+    /// A walk whose chain was followed in all branches finds the light at its end once more.
+    ChainTwice = 9,
 }
 
 #[cfg(feature = "mutants")]

@@ -11,12 +11,12 @@
 //! is left out.
 //!
 //! At each vertex every light is asked, not one at random, so that points, spots and parallel light bring no
-//! noise, and both Dirac events are followed, not one at random. Branching doubles the work, so after
-//! `BRANCHING` events one of them is chosen; that keeps the expectation and bounds memory.
+//! noise, and all Dirac events are followed ([`super::branch`]).
 
+use super::branch::{Branch, Branches};
 use super::class::{Finished, Positions, Symbol};
 use super::vertex::Vertex;
-use super::walk::{Context, Observe, Tally, sees_light, spawn};
+use super::walk::{Context, Observe, Tally, sees_light};
 use super::{Contribution, Record, Technique};
 use crate::local::Equation;
 use crate::math::Random;
@@ -24,28 +24,11 @@ use crate::scene::EmitterId;
 use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::Ray;
 use crate::spectrum::Spectrum;
-use arrayvec::ArrayVec;
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 
 const EQUATION: Equation = Equation::Rendering;
-/// Dirac events of a path at which all directions are followed.
+/// Events of a path at which all directions are followed.
 const BRANCHING: u32 = 6;
-/// Directions that a vertex can have: two of each lobe.
-const CHILDREN: usize = 2 * crate::local::composite::MAX_LOBES;
-/// Rays that can wait while the first is followed.
-const WAITING: usize = BRANCHING as usize * (CHILDREN - 1) + 1;
-
-/// A ray that is still to be followed.
-#[derive(Clone, Copy, Debug)]
-struct Branch {
-    ray: Ray,
-    throughput: Spectrum,
-    /// Edges so far.
-    length: u32,
-    class: Positions,
-    first_delta: bool,
-    last_delta: bool,
-}
 
 /// One sample of the pixel seen at `raster`, `weight` the factor of its reconstruction filter. `shadows`:
 /// lights are seen only where nothing is between.
@@ -59,16 +42,18 @@ pub fn recursive<R: Record, O: Observe>(
 ) {
     tally.rays.gather_walks += 1;
     let start = cx.scene.sensor.sample_ray(raster, random.unit2());
-    let mut open: ArrayVec<Branch, WAITING> = ArrayVec::new();
-    open.push(Branch {
+    let mut open = Branches::new(BRANCHING);
+    open.start(Branch {
         ray: Ray { o: start.o, d: start.d, t_max: start.t_max },
         throughput: Spectrum::ONE * weight,
+        eta: 1.0,
         length: 0,
         class: cx.plan.settings.paths.eye(),
         first_delta: false,
         last_delta: false,
+        event: None,
     });
-    while let Some(branch) = open.pop() {
+    while let Some(branch) = open.next() {
         Step { cx, branch, shadows }.take(&mut open, random, tally);
     }
 }
@@ -82,12 +67,7 @@ struct Step<'a> {
 
 impl Step<'_> {
     #[inline]
-    fn take<R: Record, O: Observe>(
-        &self,
-        open: &mut ArrayVec<Branch, WAITING>,
-        random: &mut Random,
-        tally: &mut Tally<'_, R, O>,
-    ) {
+    fn take<R: Record, O: Observe>(&self, open: &mut Branches, random: &mut Random, tally: &mut Tally<'_, R, O>) {
         let (scene, plan, b) = (self.cx.scene, self.cx.plan, self.branch);
         tally.rays.gather += 1;
         let Some(hit) = scene.geometry.intersect(&b.ray) else {
@@ -107,43 +87,7 @@ impl Step<'_> {
             self.light(&vertex, random, tally);
             self.ambient(&vertex, random, tally);
         }
-        self.follow(&vertex, open, random);
-    }
-
-    /// Follows all Dirac events, or one of them, chosen by what it scatters.
-    fn follow(&self, vertex: &Vertex<'_>, open: &mut ArrayVec<Branch, WAITING>, random: &mut Random) {
-        let b = self.branch;
-        let mut events: ArrayVec<(Vec3, Spectrum), CHILDREN> = ArrayVec::new();
-        vertex.each_dirac(EQUATION, |w_next, coefficient| {
-            if coefficient.max_lane() > 0.0 {
-                // There is room for two of each lobe.
-                let _ = events.try_push((w_next, coefficient));
-            }
-        });
-        let child = |(w_next, factor): (Vec3, Spectrum)| Branch {
-            ray: spawn(&vertex.surface, w_next),
-            throughput: b.throughput * factor,
-            length: b.length + 1,
-            class: self.cx.plan.settings.paths.forward(b.class, Symbol::S),
-            first_delta: b.first_delta || b.length == 0,
-            last_delta: true,
-        };
-        if b.length < BRANCHING || events.len() < 2 {
-            // And room for all that branches so often.
-            for event in events {
-                let _ = open.try_push(child(event));
-            }
-            return;
-        }
-        let total: f32 = events.iter().map(|(_, c)| c.max_lane()).sum();
-        let mut rest = random.unit() * total;
-        let found = events.iter().find(|(_, c)| {
-            rest -= c.max_lane();
-            rest < 0.0
-        });
-        if let Some((w_next, c)) = found.or(events.last()) {
-            let _ = open.try_push(child((*w_next, *c * (total / c.max_lane()))));
-        }
+        open.split(&b, &vertex, &plan.settings.paths, random);
     }
 
     /// The ray arrives on a light.
@@ -165,7 +109,7 @@ impl Step<'_> {
         for i in 0..scene.lights.infos().len() as u32 {
             let emitter = EmitterId(i);
             let u = random.unit2();
-            let Some(ne) = scene.lights.next_event_of(emitter, &scene.geometry, &plan.guide, vertex.surface.p, u) else {
+            let Some(ne) = scene.lights.next_event_of(emitter, &scene.geometry, vertex.surface.p, u) else {
                 continue;
             };
             let Some(k) = vertex.kernel(EQUATION, ne.w) else { continue };

@@ -363,6 +363,10 @@ impl Observe for Witness {
         self.vertices.push(PathVertex { surface: *surface, dirac: None });
     }
 
+    fn returned(&mut self, vertices: usize) {
+        self.vertices.truncate(vertices);
+    }
+
     fn cached(&mut self, _vertex: &LightVertex) {
         let (light, delta) = self.light.expect("only shooting walks fill the cache");
         Arc::make_mut(&mut self.subpaths).push((self.vertices.clone(), light, delta));

@@ -122,6 +122,8 @@ pub struct Settings {
     pub automatic: bool,
     /// Light paths start where a pilot found that they matter.
     pub guided: bool,
+    /// Chains of Dirac events from the eye to a light are followed in all their branches ([`super::chain`]).
+    pub branching: bool,
     /// Classes of paths that count.
     pub paths: PathFilter,
     /// Walks fill the space of their first decisions evenly.
@@ -155,6 +157,7 @@ impl Default for Settings {
             merge_radius: None,
             automatic: false,
             guided: true,
+            branching: true,
             paths: PathFilter::default(),
             stratified: true,
             seed: 0,

@@ -7,7 +7,7 @@ use super::cache::LightVertex;
 use super::class::{Finished, Symbol};
 use super::mis::{self, Partial};
 use super::vertex::Vertex;
-use super::walk::{Context, Join, Observe, Tally, Walk, end, free, spawn};
+use super::walk::{Chain, Context, Join, Observe, Tally, Walk, end, free, spawn};
 use super::{Contribution, Record, Technique};
 use crate::local::Equation;
 use crate::math::Random;
@@ -71,6 +71,7 @@ pub fn emit<R: Record, O: Observe>(
         eta: 1.0,
         class: plan.settings.paths.light(),
         first_delta: false,
+        chain: Chain::Ended,
     };
     let flux = start.weight.max_lane();
     let o = offset_origin(start.point.y, start.point.y_error, if start.infinite { Vec3::ZERO } else { start.point.n_g }, start.w);

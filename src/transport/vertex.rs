@@ -123,12 +123,12 @@ impl<'a> Vertex<'a> {
         self.scattered(equation, self.closure.sample(equation, self.back, u_lobe, u)?)
     }
 
-    /// Every Dirac event: its direction and its coefficient, lobes that share a direction apart.
+    /// Every Dirac event, lobes that share a direction apart: its weight times its probability is its coefficient.
     #[inline]
-    pub fn each_dirac(&self, equation: Equation, mut f: impl FnMut(Vec3, Spectrum)) {
+    pub fn each_dirac(&self, equation: Equation, mut f: impl FnMut(Scatter)) {
         self.closure.each_dirac(equation, self.back, |s| {
             if let Some(s) = self.scattered(equation, s) {
-                f(s.w_next, s.weight * s.p);
+                f(s);
             }
         });
     }

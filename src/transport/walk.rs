@@ -71,6 +71,19 @@ pub struct Walk {
     pub class: Positions,
     /// The first scattering event was a Dirac event.
     pub first_delta: bool,
+    /// How far it is a chain of Dirac events from the eye.
+    pub chain: Chain,
+}
+
+/// A walk that began with Dirac events, see [`super::chain`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Chain {
+    /// Nothing else so far, and there was one way on at each.
+    Single,
+    /// Nothing else so far; light at its end is found along all branches, not by this walk.
+    Branched,
+    /// It scattered otherwise, or began at a light.
+    Ended,
 }
 
 /// What arrival at a surface adds.
@@ -138,6 +151,9 @@ impl Walk {
         self.eta *= s.eta;
         if self.length == 1 {
             self.first_delta = s.delta;
+        }
+        if !s.delta {
+            self.chain = Chain::Ended;
         }
     }
 
@@ -234,6 +250,8 @@ pub trait Observe {
     fn cached(&mut self, _vertex: &LightVertex) {}
     /// The vertex last reached scattered.
     fn scattered(&mut self, _s: &Scatter) {}
+    /// The walk goes back and branches: all but the first `vertices` vertices are forgotten.
+    fn returned(&mut self, _vertices: usize) {}
     /// A path was finished.
     fn joined(&mut self, _join: Join<'_>) {}
 }

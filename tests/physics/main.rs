@@ -2,6 +2,7 @@
 //! definition, furnaces, closed forms, and planted mistakes that must be caught.
 
 mod agreement;
+mod chains;
 mod choice;
 mod determinism;
 mod furnace;

@@ -179,14 +179,18 @@ impl Record for Splats {
 struct Watch {
     witness: Witness,
     counts: Counts,
+    /// The vertex last reached has not scattered.
+    pending: bool,
 }
 impl Observe for Watch {
     fn started(&mut self, from: Vec3, light: Option<&crate::scene::emitter::Emission>) {
         self.counts.walks += 1.0;
+        self.pending = false;
         self.witness.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
         self.counts.ends += 1.0;
+        self.pending = true;
         self.witness.arrived(surface);
     }
     fn cached(&mut self, vertex: &LightVertex) {
@@ -194,7 +198,14 @@ impl Observe for Watch {
     }
     fn scattered(&mut self, s: &Scatter) {
         self.counts.ends -= if s.delta { 1.0 } else { 0.0 };
+        self.pending = false;
         self.witness.scattered(s);
+    }
+    fn returned(&mut self, vertices: usize) {
+        // Nothing is joined at the end of a branch.
+        self.counts.ends -= if self.pending { 1.0 } else { 0.0 };
+        self.pending = false;
+        self.witness.returned(vertices);
     }
     fn joined(&mut self, join: Join<'_>) {
         self.witness.joined(join);
@@ -203,7 +214,7 @@ impl Observe for Watch {
 
 impl Watch {
     fn new(witness: Witness) -> Self {
-        Self { witness, counts: Counts::default() }
+        Self { witness, counts: Counts::default(), pending: false }
     }
 }
 

@@ -242,7 +242,8 @@ impl<'a> Pilot<'a> {
     /// Radius in which vertices should be merged in the first pass: some pixels as they appear on what
     /// can be merged, so that merging blurs less than the film does.
     fn merge_radius(&self) -> f32 {
-        let settings = Settings { techniques: Techniques { next_event: false, ..Techniques::GATHER }, ..self.settings.clone() };
+        let techniques = Techniques { next_event: false, ..Techniques::GATHER };
+        let settings = Settings { techniques, branching: false, ..self.settings.clone() };
         let plan = Plan::new(&settings, 1, 1, 0.0);
         let jobs = (0..SCOUTS / JOB).into_par_iter().map(|job| {
             let mut footprints = Footprints { parallel: self.scene.sensor.is_orthographic(), ..Footprints::default() };

@@ -32,28 +32,21 @@ impl Lights {
     /// A light point as seen from `x`: the emitter by `u_pick`, the point by `u`. `None` is a sample
     /// of value zero (nothing shines from there to x), not a missing sample.
     #[inline]
-    pub fn sample_next_event(&self, geometry: &Geometry, guide: &Guide, x: Vec3, u_pick: f32, u: Vec2) -> Option<NextEvent> {
+    pub fn sample_next_event(&self, geometry: &Geometry, x: Vec3, u_pick: f32, u: Vec2) -> Option<NextEvent> {
         let choice = self.choice.as_ref()?;
         let (i, prob) = choice.next_event.sample(x, u_pick);
-        self.next_event_from(geometry, guide, x, (i, prob), u)
+        self.next_event_from(geometry, x, (i, prob), u)
     }
 
     /// The same from one emitter, of which ν is then the density without any choice.
-    pub fn next_event_of(&self, emitter: EmitterId, geometry: &Geometry, guide: &Guide, x: Vec3, u: Vec2) -> Option<NextEvent> {
+    pub fn next_event_of(&self, emitter: EmitterId, geometry: &Geometry, x: Vec3, u: Vec2) -> Option<NextEvent> {
         let (_, i) = self.chosen(emitter)?;
-        self.next_event_from(geometry, guide, x, (i, 1.0), u)
+        self.next_event_from(geometry, x, (i, 1.0), u)
     }
 
     /// A light point of emitter `i`, which was chosen with probability `prob`.
     #[inline]
-    fn next_event_from(
-        &self,
-        geometry: &Geometry,
-        guide: &Guide,
-        x: Vec3,
-        (i, prob): (usize, f32),
-        u: Vec2,
-    ) -> Option<NextEvent> {
+    fn next_event_from(&self, geometry: &Geometry, x: Vec3, (i, prob): (usize, f32), u: Vec2) -> Option<NextEvent> {
         let emitter = EmitterId(i as u32);
         match &self.emitters[i] {
             Emitter::Area(area) => {
@@ -65,22 +58,20 @@ impl Lights {
                 if cos <= 0.0 || radiance.is_black() {
                     return None;
                 }
-                let emission = self.density_emission(geometry, guide, &point, -w, x);
                 let (g, nu) = (cos * inv_d2, prob * s.p_a);
-                Some(NextEvent { point, w, distance, radiance, g, inv_d2, nu, delta: false, emission })
+                Some(NextEvent { point, w, distance, radiance, g, inv_d2, nu, delta: false })
             }
             Emitter::Point(p) => {
                 let point = EmitterPoint::delta(emitter, p.position);
-                self.finite_delta(geometry, guide, point, x, prob, |_| p.intensity)
+                finite_delta(point, x, prob, |_| p.intensity)
             }
             Emitter::Spot(s) => {
                 let point = EmitterPoint::delta(emitter, s.position);
-                self.finite_delta(geometry, guide, point, x, prob, |w| s.intensity(&self.textures, w))
+                finite_delta(point, x, prob, |w| s.intensity(&self.textures, w))
             }
             Emitter::Parallel(p) => {
                 let point = EmitterPoint::at_infinity(emitter, -p.direction);
-                let emission = self.density_emission(geometry, guide, &point, p.direction, x);
-                Some(infinite(point, p.irradiance, prob, emission, true))
+                Some(infinite(point, p.irradiance, prob, true))
             }
             Emitter::Sky(sky) => {
                 let (w, p_w, radiance) = sky.sample(u);
@@ -88,31 +79,10 @@ impl Lights {
                     return None;
                 }
                 let point = EmitterPoint::at_infinity(emitter, w);
-                let emission = self.density_emission(geometry, guide, &point, -w, x);
-                Some(infinite(point, radiance, prob * p_w, emission, false))
+                Some(infinite(point, radiance, prob * p_w, false))
             }
             Emitter::Dark => None,
         }
-    }
-
-    /// Next event of a point or spot, `intensity` as a function of the direction of travel.
-    #[inline]
-    fn finite_delta(
-        &self,
-        geometry: &Geometry,
-        guide: &Guide,
-        point: EmitterPoint,
-        x: Vec3,
-        prob: f32,
-        intensity: impl FnOnce(Vec3) -> Spectrum,
-    ) -> Option<NextEvent> {
-        let (w, distance, inv_d2) = toward(x, point.y)?;
-        let radiance = intensity(-w);
-        if radiance.is_black() {
-            return None;
-        }
-        let emission = self.density_emission(geometry, guide, &point, -w, x);
-        Some(NextEvent { point, w, distance, radiance, g: inv_d2, inv_d2, nu: prob, delta: true, emission })
     }
 
     /// ν of a light point as seen from `x` along the unit direction `w` (from x outwards): per m² of an
@@ -393,7 +363,18 @@ fn emitted(
     Some(Emission { point, w, weight: value * (1.0 / p), density, delta, infinite })
 }
 
+/// Next event of a point or spot, `intensity` as a function of the direction of travel.
 #[inline]
-fn infinite(point: EmitterPoint, radiance: Spectrum, nu: f32, emission: EmissionDensity, delta: bool) -> NextEvent {
-    NextEvent { point, w: -point.n_g, distance: f32::INFINITY, radiance, g: 1.0, inv_d2: 1.0, nu, delta, emission }
+fn finite_delta(point: EmitterPoint, x: Vec3, prob: f32, intensity: impl FnOnce(Vec3) -> Spectrum) -> Option<NextEvent> {
+    let (w, distance, inv_d2) = toward(x, point.y)?;
+    let radiance = intensity(-w);
+    if radiance.is_black() {
+        return None;
+    }
+    Some(NextEvent { point, w, distance, radiance, g: inv_d2, inv_d2, nu: prob, delta: true })
+}
+
+#[inline]
+fn infinite(point: EmitterPoint, radiance: Spectrum, nu: f32, delta: bool) -> NextEvent {
+    NextEvent { point, w: -point.n_g, distance: f32::INFINITY, radiance, g: 1.0, inv_d2: 1.0, nu, delta }
 }

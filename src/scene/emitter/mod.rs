@@ -106,8 +106,6 @@ pub struct NextEvent {
     pub nu: f32,
     /// Cannot be hit.
     pub delta: bool,
-    /// Densities with which shooting makes the same light point and direction.
-    pub emission: EmissionDensity,
 }
 
 /// Densities with which shooting makes a light point and a direction from it.

@@ -19,7 +19,7 @@ fn no_light_is_no_sample() {
     for world in [World::new(vec![], vec![]), World::new(vec![ball()], vec![(black, None)])] {
         assert!(world.lights.is_empty() && !world.lights.has_environment());
         let (g, u) = (&world.geometry, Vec2::splat(0.5));
-        assert!(world.lights.sample_next_event(g, &Guide::default(), Vec3::ZERO, 0.5, u).is_none());
+        assert!(world.lights.sample_next_event(g, Vec3::ZERO, 0.5, u).is_none());
         assert!(world.lights.sample_emission(g, &Guide::default(), 0.5, u, u).is_none());
         assert!(world.lights.sample_point(g, 0.5, u).is_none());
         world.lights.environment(Vec3::Z, |_, _| panic!("no light, but radiance"));
@@ -56,8 +56,8 @@ fn emission_is_one_sided() {
     assert_eq!(world.lights.radiance(&point, Vec3::Z), Spectrum::ONE);
     assert!(world.lights.radiance(&point, -Vec3::Z).is_black());
     let below = Vec3::new(0.1, 0.2, -1.0);
-    assert!(world.lights.sample_next_event(&world.geometry, &Guide::default(), below, 0.5, Vec2::splat(0.3)).is_none());
-    assert!(world.lights.sample_next_event(&world.geometry, &Guide::default(), -below, 0.5, Vec2::splat(0.3)).is_some());
+    assert!(world.lights.sample_next_event(&world.geometry, below, 0.5, Vec2::splat(0.3)).is_none());
+    assert!(world.lights.sample_next_event(&world.geometry, -below, 0.5, Vec2::splat(0.3)).is_some());
 }
 
 /// A sun of half a degree faces a plane with the irradiance it was given.
@@ -74,8 +74,7 @@ fn sun_disk_keeps_the_irradiance() {
         let n = 4_000;
         let (mut sum, mut seen) = (0.0, 0);
         for _ in 0..n {
-            let e =
-                world.lights.sample_next_event(&world.geometry, &Guide::default(), Vec3::ZERO, 0.5, random.unit2()).expect("lit");
+            let e = world.lights.sample_next_event(&world.geometry, Vec3::ZERO, 0.5, random.unit2()).expect("lit");
             sum += e.radiance.0.x * e.g / e.nu * e.w.dot(-direction.normalize()) / n as f32;
             world.lights.environment(e.w, |_, l| seen += i32::from(l == e.radiance));
         }

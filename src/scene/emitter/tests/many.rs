@@ -184,7 +184,7 @@ fn behind_all_lights_power_decides() {
     let u = Vec2::splat(0.4);
     assert!((0..64).all(|k| {
         let pick = k as f32 / 64.0;
-        world.lights.sample_next_event(&world.geometry, &Guide::default(), behind, pick, u).is_none()
+        world.lights.sample_next_event(&world.geometry, behind, pick, u).is_none()
     }));
 }
 
@@ -230,7 +230,7 @@ fn frequencies_are_the_probabilities() {
 
 /// Unshadowed light at x from a point of an emitter: what a bound must not call impossible.
 fn arrives(world: &World, emitter: EmitterId, x: Vec3, u: Vec2) -> bool {
-    let event = world.lights.next_event_of(emitter, &world.geometry, &Guide::default(), x, u);
+    let event = world.lights.next_event_of(emitter, &world.geometry, x, u);
     event.is_some_and(|e| e.radiance.max_lane() * e.g > 0.0)
 }
 
@@ -326,7 +326,7 @@ fn one_by_one(world: &World, x: Vec3, n: Vec3, random: &mut Random) -> (f64, f64
         let (mean, square) = moments(M * M, || {
             let u = (Vec2::new((k % M) as f32, (k / M) as f32) + random.unit2()) / M as f32;
             k += 1;
-            let event = world.lights.next_event_of(EmitterId(i), &world.geometry, &Guide::default(), x, u);
+            let event = world.lights.next_event_of(EmitterId(i), &world.geometry, x, u);
             event.map_or(0.0, |e| irradiance(e, n))
         });
         exact += mean;
@@ -340,7 +340,7 @@ fn tested_variance(world: &World, x: Vec3, n: Vec3, random: &mut Random) -> f64 
     let (exact, error) = one_by_one(world, x, n, random);
     let samples = 100_000;
     let (mean, square) = moments(samples, || {
-        let event = world.lights.sample_next_event(&world.geometry, &Guide::default(), x, random.unit(), random.unit2());
+        let event = world.lights.sample_next_event(&world.geometry, x, random.unit(), random.unit2());
         event.map_or(0.0, |e| irradiance(e, n))
     });
     let variance = square - mean * mean;
@@ -373,7 +373,7 @@ fn variance_is_a_part_of_that_by_power() {
             let (mean, square) = moments(100_000, || {
                 let (i, prob, _) = by_power.sample(random.unit());
                 let i = EmitterId(i as u32);
-                let event = world.lights.next_event_of(i, &world.geometry, &Guide::default(), x, random.unit2());
+                let event = world.lights.next_event_of(i, &world.geometry, x, random.unit2());
                 event.map_or(0.0, |e| irradiance(e, Vec3::Z) / f64::from(prob))
             });
             (square - mean * mean) / variance

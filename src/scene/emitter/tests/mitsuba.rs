@@ -124,7 +124,7 @@ fn spot_agrees() {
     for (texture, reference) in [(None, SPOT), (Some(bitmap), SPOT_TEXTURED)] {
         let world = World::with_images(vec![], vec![(spot(texture), None)], &images);
         for (x, expected) in reference {
-            let event = world.lights.sample_next_event(&world.geometry, &Guide::default(), Vec3::from(*x), 0.5, Vec2::splat(0.5));
+            let event = world.lights.sample_next_event(&world.geometry, Vec3::from(*x), 0.5, Vec2::splat(0.5));
             let got = event.map_or(Spectrum::BLACK, |e| e.radiance * (e.g / e.nu));
             assert!(close(got.to_rgb(), *expected, 1e-4), "{x:?}: {:?} for {expected:?}", got.to_rgb());
         }
@@ -135,10 +135,7 @@ fn spot_agrees() {
 fn point_and_directional_agree() {
     let at = |model: EmitterModel| {
         let world = World::new(vec![], vec![(model, None)]);
-        world
-            .lights
-            .sample_next_event(&world.geometry, &Guide::default(), Vec3::new(0.1, 0.2, 0.3), 0.5, Vec2::splat(0.5))
-            .expect("lit")
+        world.lights.sample_next_event(&world.geometry, Vec3::new(0.1, 0.2, 0.3), 0.5, Vec2::splat(0.5)).expect("lit")
     };
     let intensity = [3.0, 2.0, 1.0];
     let point = at(EmitterModel::Point { position: Vec3::new(1.0, 2.0, 3.0), intensity });

@@ -1,0 +1,84 @@
+//! Chains of Dirac events between eye and light, the paths E S+ L, with all their branches.
+//!
+//! Nothing but a hit makes these paths. A walk that follows one event at random finds the rare ones, a lamp
+//! mirrored twice in the glass around it, once in ten thousand samples, at its full radiance. So where such a
+//! walk comes to the first vertex at which it would have to choose, all chains from there are followed here
+//! instead, and the walk itself finds no light until a wider event.
+
+use super::Record;
+use super::branch::{Branch, Branches, MOST_BRANCHING};
+use super::gather::chain_hit;
+use super::vertex::Vertex;
+use super::walk::{Context, Observe, Tally, Walk};
+use crate::math::Random;
+use crate::scene::EmitterId;
+use crate::scene::emitter::EmitterPoint;
+use crate::scene::geometry::Ray;
+
+/// Branches that carry less than this share of the pixel are followed with a probability only.
+const FAINT: f32 = 1e-2;
+
+/// Follows the chains of Dirac events that go on from `vertex`, at which `walk` has arrived by such events
+/// alone; false (and nothing is followed) where there is no more than one way on. `weight` is what the walk
+/// began with.
+pub fn follow<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    vertex: &Vertex<'_>,
+    weight: f32,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) -> bool {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let filter = &plan.settings.paths;
+    let mut open = Branches::new(MOST_BRANCHING);
+    let here = Branch {
+        ray: Ray { o: vertex.surface.p, d: vertex.w_back, t_max: 0.0 },
+        throughput: walk.throughput,
+        eta: walk.eta,
+        length: walk.length,
+        class: walk.class,
+        first_delta: walk.first_delta,
+        last_delta: walk.delta,
+        event: None,
+    };
+    let ways = open.split(&here, vertex, filter, random);
+    if ways == 0 || (ways == 1 && vertex.closure.is_delta()) {
+        return false;
+    }
+    while let Some(mut branch) = open.next() {
+        // Radiance is scaled by η² inside glass, what it carries is not.
+        let share = branch.throughput.max_lane() * branch.eta * branch.eta / weight;
+        if share < FAINT {
+            // Not so for NaN, which ends here.
+            if !(random.unit() * FAINT < share) {
+                continue;
+            }
+            branch.throughput *= FAINT / share;
+        }
+        if let Some((surface, event)) = &branch.event {
+            tally.observe.returned(branch.length as usize - 1);
+            tally.observe.arrived(surface);
+            tally.observe.scattered(event);
+        }
+        tally.rays.gather += 1;
+        let Some(hit) = scene.geometry.intersect(&branch.ray) else {
+            scene.lights.environment(branch.ray.d, |emitter, radiance| {
+                chain_hit(cx, &branch, &EmitterPoint::at_infinity(emitter, branch.ray.d), radiance, tally);
+            });
+            continue;
+        };
+        let surface = scene.geometry.surface(&branch.ray, &hit);
+        if surface.emitter != EmitterId::NONE {
+            let point = EmitterPoint::on_surface(&surface);
+            chain_hit(cx, &branch, &point, scene.lights.radiance(&point, -branch.ray.d), tally);
+        }
+        if branch.length + 1 < plan.settings.max_length {
+            tally.observe.arrived(&surface);
+            open.split(&branch, &Vertex::new(scene, surface, -branch.ray.d), filter, random);
+        }
+    }
+    tally.observe.returned(walk.length as usize);
+    tally.observe.arrived(&vertex.surface);
+    true
+}

@@ -1,0 +1,100 @@
+//! Chains of Dirac events between eye and light: all branches are followed, and none counts twice.
+
+use crate::scenes;
+use crate::support::{Effort, scene, seed, series};
+use nephroid::render::{Budget, Control, Options, Render};
+use nephroid::report::agreement::agreement;
+use nephroid::transport::class::PathFilter;
+use nephroid::transport::settings::{Settings, Techniques};
+
+/// A lamp of radiance 1 behind a plate of index 4.
+const PLATE: &str = r#"<scene version="3.0.0">
+<sensor type="orthographic"><transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="16"/><rfilter type="box"/></film></sensor>
+<bsdf type="dielectric" id="glass"><float name="int_ior" value="4"/><float name="ext_ior" value="1"/></bsdf>
+<shape type="rectangle"><transform name="to_world"><scale value="2"/><translate z="1"/></transform><ref id="glass"/></shape>
+<shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="180"/><translate z="0.8"/></transform><ref id="glass"/></shape>
+<shape type="rectangle"><transform name="to_world"><scale value="2"/></transform>
+  <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>
+</scene>"#;
+
+/// A small bright lamp in a globe of glass, as seen from outside.
+const GLOBE: &str = r#"<scene version="3.0.0">
+<sensor type="perspective"><float name="fov" value="28"/>
+  <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
+<shape type="sphere"><float name="radius" value="1"/><bsdf type="dielectric"/></shape>
+<shape type="sphere"><float name="radius" value="0.9"/><boolean name="flip_normals" value="true"/><bsdf type="dielectric"/></shape>
+<shape type="sphere"><point name="center" value="0, 0.2, 0"/><float name="radius" value="0.06"/>
+  <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="1000"/></emitter></shape>
+</scene>"#;
+
+fn settings(techniques: &str, branching: bool, add: u64) -> Settings {
+    Settings {
+        techniques: Techniques::parse(techniques).unwrap(),
+        branching,
+        rr_depth: 4,
+        seed: seed() * 1000 + 800 + add,
+        ..Settings::default()
+    }
+}
+
+/// After 2k reflections inside, (1−R)² R^{2k} comes through: in every pixel, from one sample, while that is no faint branch.
+#[test]
+fn a_plate_lets_the_same_through_in_every_sample() {
+    let world = scene(PLATE);
+    let r = (3.0f64 / 5.0).powi(2);
+    for k in 0..2u32 {
+        let length = 3 + 2 * k;
+        let limits = Settings { min_length: length, max_length: length, ..settings("hit,nee", true, 0) };
+        let mut render = Render::new(&world, &Options { settings: limits, ..Options::default() }).unwrap();
+        render.run(&Budget::passes(1), |_| Control::Continue);
+        let exact = (1.0 - r).powi(2) * r.powi(2 * k as i32);
+        for pixel in &render.picture().mean {
+            assert!((f64::from(pixel[0]) / exact - 1.0).abs() < 1e-4, "length {length}: {pixel:?}, {exact}");
+        }
+    }
+}
+
+/// What branches is what chance would have found, for every length; glass, mirror, and plastic whose coat is Dirac.
+#[test]
+fn branches_find_what_walks_find() {
+    let dir = tempfile::tempdir().unwrap();
+    let plastic = r#"<bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.5"/></bsdf>"#;
+    let coated = scenes::named(dir.path(), "glass and mirror")
+        .replace(r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#, plastic);
+    assert!(coated.contains("plastic"));
+    for (i, xml) in [scenes::named(dir.path(), "glass and mirror"), coated].iter().enumerate() {
+        let world = scene(xml);
+        let effort = Effort { renders: 40, passes: 6, max_length: 7 };
+        for (j, techniques) in ["hit", "hit,nee,splat,connect"].iter().enumerate() {
+            let add = 10 * i as u64 + 2 * j as u64;
+            let on = series(&world, &settings(techniques, true, add), effort);
+            let off = series(&world, &settings(techniques, false, add + 1), effort);
+            for k in 1..=effort.max_length as usize {
+                let v = agreement(&on[k], &off[k]);
+                let (a, b) = v.totals;
+                assert!(v.p > 1e-5, "{techniques}, length {k}: {a:.4e} by branches, {b:.4e} by chance, p = {:.1e}", v.p);
+            }
+        }
+    }
+}
+
+/// The lamp mirrored in its globe: one sample in hundreds by chance, every sample by branches.
+#[test]
+fn reflections_of_a_lamp_in_its_globe_are_calm() {
+    let world = scene(GLOBE);
+    let effort = Effort { renders: 40, passes: 4, max_length: 9 };
+    let mean_and_variance = |branching: bool| {
+        let filter = PathFilter::parse("E S S S S+ L").unwrap();
+        let all = series(&world, &Settings { paths: filter, ..settings("hit", branching, 50 + u64::from(!branching)) }, effort);
+        let draws: Vec<f64> =
+            (0..effort.renders as usize).map(|d| all.iter().map(|s| s.draws[d].iter().sum::<f64>()).sum()).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        (mean, draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (draws.len() - 1) as f64)
+    };
+    let (on, off) = (mean_and_variance(true), mean_and_variance(false));
+    let z = (on.0 - off.0) / ((on.1 + off.1) / effort.renders as f64).sqrt();
+    assert!(z.abs() < 4.0 && on.0 > 0.0, "{on:?} by branches, {off:?} by chance");
+    assert!(on.1 < 0.2 * off.1, "{on:?} by branches, {off:?} by chance");
+}
