@@ -2,7 +2,8 @@
 //!
 //! The coefficient of an event takes the place of its probability, so that what a rare branch finds comes in
 //! every sample with little weight, not rarely with all of it [Whitted 1980]. Branching doubles the work, so
-//! after some events one of them is chosen; that keeps the expectation and bounds memory.
+//! after some events, or where no more rays can wait, one of them is chosen; that keeps the expectation and
+//! bounds memory.
 
 use super::class::{PathFilter, Positions, Symbol};
 use super::vertex::{Scatter, Vertex};
@@ -14,12 +15,10 @@ use crate::scene::geometry::Ray;
 use crate::spectrum::Spectrum;
 use arrayvec::ArrayVec;
 
-/// Events of a path after which all directions are followed, at most.
-pub const MOST_BRANCHING: u32 = 8;
 /// Directions that a vertex can have: two of each lobe.
 const CHILDREN: usize = 2 * crate::local::composite::MAX_LOBES;
 /// Rays that can wait while the first is followed.
-const WAITING: usize = MOST_BRANCHING as usize * (CHILDREN - 1) + 1;
+const WAITING: usize = 96;
 
 /// A ray that is still to be followed.
 #[derive(Clone, Copy, Debug)]
@@ -49,9 +48,9 @@ pub struct Branches {
 }
 
 impl Branches {
-    /// None yet; all directions are followed after up to `branching` events (at most [`MOST_BRANCHING`]).
+    /// None yet; all directions are followed at the first `branching` events of a path.
     pub fn new(branching: u32) -> Self {
-        Self { open: ArrayVec::new(), branching: branching.min(MOST_BRANCHING) }
+        Self { open: ArrayVec::new(), branching }
     }
 
     /// The ray from the lens.
@@ -85,8 +84,8 @@ impl Branches {
             last_delta: true,
             event: Some((vertex.surface, *s)),
         };
-        if from.length < self.branching || events.len() < 2 {
-            // And room for all that branches so often.
+        let room = self.open.remaining_capacity() >= events.len();
+        if events.len() < 2 || (room && from.length < self.branching) {
             events.iter().for_each(|(s, c)| {
                 let _ = self.open.try_push(child(s, *c));
             });

@@ -6,7 +6,7 @@
 //! instead, and the walk itself finds no light until a wider event.
 
 use super::Record;
-use super::branch::{Branch, Branches, MOST_BRANCHING};
+use super::branch::{Branch, Branches};
 use super::gather::chain_hit;
 use super::vertex::Vertex;
 use super::walk::{Context, Observe, Tally, Walk};
@@ -17,6 +17,10 @@ use crate::scene::geometry::Ray;
 
 /// Branches that carry less than this share of the pixel are followed with a probability only.
 const FAINT: f32 = 1e-2;
+/// So are all after so many events, where mirrors could go on for ever,
+const LONG: u32 = 16;
+/// with this one.
+const GOES_ON: f32 = 0.9;
 
 /// Follows the chains of Dirac events that go on from `vertex`, at which `walk` has arrived by such events
 /// alone; false (and nothing is followed) where there is no more than one way on. `weight` is what the walk
@@ -31,7 +35,7 @@ pub fn follow<R: Record, O: Observe>(
 ) -> bool {
     let (scene, plan) = (cx.scene, cx.plan);
     let filter = &plan.settings.paths;
-    let mut open = Branches::new(MOST_BRANCHING);
+    let mut open = Branches::new(u32::MAX);
     let here = Branch {
         ray: Ray { o: vertex.surface.p, d: vertex.w_back, t_max: 0.0 },
         throughput: walk.throughput,
@@ -55,6 +59,12 @@ pub fn follow<R: Record, O: Observe>(
                 continue;
             }
             branch.throughput *= FAINT / share;
+        }
+        if branch.length > LONG {
+            if random.unit() >= GOES_ON {
+                continue;
+            }
+            branch.throughput /= GOES_ON;
         }
         if let Some((surface, event)) = &branch.event {
             tally.observe.returned(branch.length as usize - 1);

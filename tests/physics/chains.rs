@@ -98,3 +98,29 @@ fn reflections_of_a_lamp_in_its_globe_are_calm() {
     assert!(z.abs() < 4.0 && on.0 > 0.0, "{on:?} by branches, {off:?} by chance");
     assert!(on.1 < 0.2 * off.1, "{on:?} by branches, {off:?} by chance");
 }
+
+/// Glass in a room of mirrors, without a longest path: chains that could go on for ever end, and nothing is lost.
+#[test]
+fn chains_end_in_a_room_of_mirrors() {
+    let mirrors = GLOBE.replace(
+        "</scene>",
+        r#"<bsdf type="conductor" id="mirror"><string name="material" value="none"/><rgb name="specular_reflectance" value="0.8"/></bsdf>
+<shape type="cube"><transform name="to_world"><scale value="6"/></transform><boolean name="flip_normals" value="true"/><ref id="mirror"/></shape></scene>"#,
+    );
+    let world = scene(&mirrors);
+    let effort = Effort { renders: 40, passes: 2, max_length: 40 };
+    let of = |branching| {
+        let limits = Settings { rr_depth: 40, ..settings("hit", branching, 60 + u64::from(!branching)) };
+        let all = series(&world, &limits, effort);
+        let draws: Vec<f64> =
+            (0..effort.renders as usize).map(|d| all.iter().map(|s| s.draws[d].iter().sum::<f64>()).sum()).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        (mean, draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / ((draws.len() - 1) * draws.len()) as f64)
+    };
+    let (on, off) = (of(true), of(false));
+    let z = (on.0 - off.0) / (on.1 + off.1).sqrt();
+    assert!(z.abs() < 4.0 && on.0 > 0.0, "{on:?} by branches, {off:?} by chance");
+    let mut render = Render::new(&world, &Options { settings: settings("hit", true, 62), ..Options::default() }).unwrap();
+    render.run(&Budget::passes(1), |_| Control::Continue);
+    assert!(render.picture().mean.iter().all(|p| p[0].is_finite()));
+}
