@@ -59,7 +59,7 @@ impl Branches {
     }
 
     /// The next ray.
-    pub fn next(&mut self) -> Option<Branch> {
+    pub fn take(&mut self) -> Option<Branch> {
         self.open.pop()
     }
 

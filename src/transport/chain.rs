@@ -50,7 +50,7 @@ pub fn follow<R: Record, O: Observe>(
     if ways == 0 || (ways == 1 && vertex.closure.is_delta()) {
         return false;
     }
-    while let Some(mut branch) = open.next() {
+    while let Some(mut branch) = open.take() {
         // Radiance is scaled by η² inside glass, what it carries is not.
         let share = branch.throughput.max_lane() * branch.eta * branch.eta / weight;
         if share < FAINT {

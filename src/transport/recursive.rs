@@ -53,7 +53,7 @@ pub fn recursive<R: Record, O: Observe>(
         last_delta: false,
         event: None,
     });
-    while let Some(branch) = open.next() {
+    while let Some(branch) = open.take() {
         Step { cx, branch, shadows }.take(&mut open, random, tally);
     }
 }
