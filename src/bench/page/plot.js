@@ -2,7 +2,10 @@
 
 function plot(scene, measure, axis) {
   // In the units of its text, so that it can be read on a narrow screen.
-  const W = Math.min(720, Math.max(360, document.documentElement.clientWidth - 24)), H = W < 520 ? 320 : 400, L = 54, R = 104, T = 14, B = 40;
+  const W = Math.min(720, Math.max(360, document.documentElement.clientWidth - 24)), H = W < 520 ? 320 : 400, L = 54, T = 14, B = 40;
+  // Room for the names at the right; those of peers are long.
+  const letter = 7.6, longest = Math.max(...scene.contenders.map(c => c.name.length)), R = Math.min(Math.max(104, letter * longest + 16), 0.34 * W);
+  const half = Math.floor((R - 16) / letter / 2), short = name => name.length <= 2 * half ? name : `${name.slice(0, half)}…${name.slice(1 - half)}`;
   const of = p => measures[measure].floor(p);
   const curves = scene.contenders.map(c => c.runs.map(r => r.curve.filter(p => p[measure] > 0)));
   const points = curves.flat(2);
@@ -51,7 +54,7 @@ function plot(scene, measure, axis) {
   });
   ends.sort((a, b) => a.y - b.y);
   ends.forEach((e, k) => { if (k && e.y < ends[k - 1].y + 15) e.y = ends[k - 1].y + 15; });
-  for (const e of ends) svg.append(h("text", { x: W - R + 8, y: e.y + 4, style: `fill:${colour(e.i)};font-weight:600` }, scene.contenders[e.i].name));
+  for (const e of ends) svg.append(h("text", { x: W - R + 8, y: e.y + 4, style: `fill:${colour(e.i)};font-weight:600` }, short(scene.contenders[e.i].name), h("title", {}, scene.contenders[e.i].name)));
   return svg;
 }
 
