@@ -127,7 +127,7 @@ pub struct Adjoint {
     pub left_out: Vec<Blind>,
     /// Share of the energy of the classes both can make that was tested.
     pub energy_tested: f64,
-    /// Share of it, of that, which was tested with an allowance for large contributions that may be due.
+    /// Share of the same energy that was tested, but with an allowance for large contributions that may be due.
     pub energy_allowed: f64,
     /// Corrected over all lengths and lights.
     pub p: f64,

@@ -6,7 +6,7 @@
 use super::branch::Branch;
 use super::cache::{LightCache, LightVertex};
 use super::chain;
-use super::class::{Finished, Symbol};
+use super::class::{Finished, Positions, Symbol};
 use super::mis::{self, Partial};
 use super::mutant::{Mutant, planted};
 use super::vertex::Vertex;
@@ -210,27 +210,8 @@ fn hit<R: Record, O: Observe>(
         let k = if length == 2 && !plan.splat_direct { 0.0 } else { walk.k };
         mis::hit(plan.settings.heuristic, arrival.p_a, nu, e, k)
     };
-    let path = Finished {
-        from_eye: walk.class,
-        from_light: plan.settings.paths.light(),
-        length,
-        first_delta: walk.first_delta,
-        last_delta: walk.delta,
-        light_delta: false,
-    };
     let value = walk.throughput * radiance * weight;
-    let join = Join {
-        technique: Technique::Hit,
-        weight,
-        length,
-        light: Some(point),
-        emitter: point.emitter,
-        light_delta: false,
-        light_vertex: 0,
-        lens: Vec3::ZERO,
-        value,
-    };
-    finish(cx, path, value, join, 0, tally);
+    arrived_on_light(cx, (walk.class, walk.first_delta, walk.delta), length, point, (value, weight), tally);
 }
 
 /// A chain of Dirac events arrived on a light: no other join makes its path.
@@ -245,26 +226,35 @@ pub(super) fn chain_hit<R: Record, O: Observe>(
     if radiance.is_black() || !cx.plan.wants_length(length) {
         return;
     }
-    let path = Finished {
-        from_eye: branch.class,
-        from_light: cx.plan.settings.paths.light(),
-        length,
-        first_delta: branch.first_delta,
-        last_delta: branch.last_delta,
-        light_delta: false,
-    };
+    let value = branch.throughput * radiance;
+    arrived_on_light(cx, (branch.class, branch.first_delta, branch.last_delta), length, point, (value, 1.0), tally);
+}
+
+/// Hands on a path that ends where its last ray arrived on a light; of its events the positions they reach, and
+/// whether the first and the last are Dirac events.
+#[inline]
+fn arrived_on_light<R: Record, O: Observe>(
+    cx: Context<'_>,
+    (from_eye, first_delta, last_delta): (Positions, bool, bool),
+    length: u32,
+    point: &EmitterPoint,
+    (value, weight): (Spectrum, f32),
+    tally: &mut Tally<'_, R, O>,
+) {
+    let from_light = cx.plan.settings.paths.light();
+    let path = Finished { from_eye, from_light, length, first_delta, last_delta, light_delta: false };
     let join = Join {
         technique: Technique::Hit,
-        weight: 1.0,
+        weight,
         length,
         light: Some(point),
         emitter: point.emitter,
         light_delta: false,
         light_vertex: 0,
         lens: Vec3::ZERO,
-        value: branch.throughput * radiance,
+        value,
     };
-    finish(cx, path, join.value, join, 0, tally);
+    finish(cx, path, value, join, 0, tally);
 }
 
 /// Picks a light point from `vertex`.

@@ -15,6 +15,7 @@
 //! - [`walk`]: one step of either walker.
 //! - [`gather`], [`shoot`]: the two walks, alike on purpose.
 //! - [`recursive`]: part of the coupling, or none: recursive ray tracing, local illumination.
+//! - [`chain`], [`branch`]: Dirac events followed in all directions, beside a gathering walk.
 //! - [`cache`], [`merge`]: light vertices kept for connections and merges.
 //! - [`mod@reference`]: the same weights the slow way, for tests.
 

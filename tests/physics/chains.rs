@@ -4,6 +4,7 @@ use crate::scenes;
 use crate::support::{Effort, scene, seed, series};
 use nephroid::render::{Budget, Control, Options, Render};
 use nephroid::report::agreement::agreement;
+use nephroid::scene::Scene;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::settings::{Settings, Techniques};
 
@@ -37,6 +38,15 @@ fn settings(techniques: &str, branching: bool, add: u64) -> Settings {
         seed: seed() * 1000 + 800 + add,
         ..Settings::default()
     }
+}
+
+/// Mean of all paths over the film, and its variance.
+fn total(world: &Scene, settings: &Settings, effort: Effort) -> (f64, f64) {
+    let all = series(world, settings, effort);
+    let n = effort.renders as usize;
+    let draws: Vec<f64> = (0..n).map(|d| all.iter().map(|s| s.draws[d].iter().sum::<f64>()).sum()).collect();
+    let mean = draws.iter().sum::<f64>() / n as f64;
+    (mean, draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / ((n - 1) * n) as f64)
 }
 
 /// After 2k reflections inside, (1−R)² R^{2k} comes through: in every pixel, from one sample, while that is no faint branch.
@@ -85,16 +95,12 @@ fn branches_find_what_walks_find() {
 fn reflections_of_a_lamp_in_its_globe_are_calm() {
     let world = scene(GLOBE);
     let effort = Effort { renders: 40, passes: 4, max_length: 9 };
-    let mean_and_variance = |branching: bool| {
-        let filter = PathFilter::parse("E S S S S+ L").unwrap();
-        let all = series(&world, &Settings { paths: filter, ..settings("hit", branching, 50 + u64::from(!branching)) }, effort);
-        let draws: Vec<f64> =
-            (0..effort.renders as usize).map(|d| all.iter().map(|s| s.draws[d].iter().sum::<f64>()).sum()).collect();
-        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
-        (mean, draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (draws.len() - 1) as f64)
+    let of = |branching| {
+        let paths = PathFilter::parse("E S S S S+ L").unwrap();
+        total(&world, &Settings { paths, ..settings("hit", branching, 50 + u64::from(!branching)) }, effort)
     };
-    let (on, off) = (mean_and_variance(true), mean_and_variance(false));
-    let z = (on.0 - off.0) / ((on.1 + off.1) / effort.renders as f64).sqrt();
+    let (on, off) = (of(true), of(false));
+    let z = (on.0 - off.0) / (on.1 + off.1).sqrt();
     assert!(z.abs() < 4.0 && on.0 > 0.0, "{on:?} by branches, {off:?} by chance");
     assert!(on.1 < 0.2 * off.1, "{on:?} by branches, {off:?} by chance");
 }
@@ -111,11 +117,7 @@ fn chains_end_in_a_room_of_mirrors() {
     let effort = Effort { renders: 40, passes: 2, max_length: 40 };
     let of = |branching| {
         let limits = Settings { rr_depth: 40, ..settings("hit", branching, 60 + u64::from(!branching)) };
-        let all = series(&world, &limits, effort);
-        let draws: Vec<f64> =
-            (0..effort.renders as usize).map(|d| all.iter().map(|s| s.draws[d].iter().sum::<f64>()).sum()).collect();
-        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
-        (mean, draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / ((draws.len() - 1) * draws.len()) as f64)
+        total(&world, &limits, effort)
     };
     let (on, off) = (of(true), of(false));
     let z = (on.0 - off.0) / (on.1 + off.1).sqrt();
