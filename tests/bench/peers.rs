@@ -6,15 +6,11 @@ use std::process::Command;
 
 /// A bench of the room's scene with a `python3` that does what the shell script says.
 fn with_python(room: &Room, script: &str) -> (i32, String) {
-    use std::os::unix::fs::PermissionsExt;
-    let folder = room.path("bin");
-    std::fs::create_dir_all(&folder).unwrap();
-    let file = folder.join("python3");
-    std::fs::write(&file, format!("#!/bin/sh\n{script}\n")).unwrap();
-    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o755)).unwrap();
-    let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default());
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/bench/bin");
+    let path = format!("{folder}:{}", std::env::var("PATH").unwrap_or_default());
     let output = Command::new(env!("CARGO_BIN_EXE_nephroid"))
         .env("PATH", path)
+        .env("NEPHROID_TEST_PEER", script)
         .arg("bench")
         .arg(room.path("ball.xml"))
         .args(["-e", "gather", "--peer", "mitsuba", "--spp", "2", "--runs", "4", "--reference-time", "1s", "-o"])

@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(600);
 /// Between two looks at whether somebody wants to stop.
 const TICK: Duration = Duration::from_millis(100);
+/// Longest time from the end of a pipe to the end of its process.
+const LAST_WORDS: Duration = Duration::from_secs(2);
 
 /// A running peer.
 pub struct Process {
@@ -77,11 +79,16 @@ impl Process {
         writeln!(self.input, "{message}").and_then(|()| self.input.flush()).map_err(|_| self.gone())
     }
 
+    /// Why nothing is heard: a process that ends closes its pipes first, so its status may be a moment away.
     fn gone(&mut self) -> String {
-        match self.child.try_wait() {
-            Ok(Some(status)) => format!("the process ended ({status})"),
-            _ => "the process does not listen any more".into(),
+        let begin = Instant::now();
+        while begin.elapsed() < LAST_WORDS {
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return format!("the process ended ({status})");
+            }
+            std::thread::sleep(LAST_WORDS / 100);
         }
+        "the process does not listen any more".into()
     }
 
     /// The next line; nothing where `stop` said so.
