@@ -17,7 +17,7 @@ use nephroid::proof::residual;
 use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
-use nephroid::transport::settings::{Settings, Techniques};
+use nephroid::transport::settings::{FAINT, Settings, Techniques};
 use support::{Effort, scene, seed, series};
 
 /// A mistake is planted for the whole process.
@@ -154,7 +154,7 @@ fn planted_mistakes_double_chains() {
     let chains = |branching, seed| {
         let techniques = Techniques::parse("hit").unwrap();
         let paths = PathFilter::parse("E S+ L").unwrap();
-        let settings = Settings { techniques, paths, branching, seed, ..Settings::default() };
+        let settings = Settings { techniques, paths, faint: if branching { FAINT } else { 1.0 }, seed, ..Settings::default() };
         series(&world, &settings, Effort { renders: 64, passes: 10, max_length: 5 })
     };
     let by_chance = chains(false, seed() * 77 + 1);

@@ -3,7 +3,7 @@
 use super::Failure;
 use crate::io::fault::{Fault, reason};
 use crate::io::write::write_atomic;
-use crate::transport::settings::{Plan, Settings, Techniques};
+use crate::transport::settings::{FAINT, Plan, Settings, Techniques};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -22,6 +22,13 @@ struct PlanFile {
     connections: u32,
     /// In the first pass; 0 where nothing merges.
     merge_radius: f32,
+    /// Share of a pixel below which a branch between eye and lamp is left to chance; 1: all are.
+    #[serde(default = "faint")]
+    faint_branches: f32,
+}
+
+fn faint() -> f32 {
+    FAINT
 }
 
 /// As text, for files and for images' attributes.
@@ -32,6 +39,7 @@ pub fn text(plan: &Plan) -> String {
         light_paths: plan.light_paths,
         connections: s.connections,
         merge_radius: plan.merge_radius,
+        faint_branches: s.faint,
     };
     serde_json::to_string(&file).unwrap_or_default()
 }
@@ -55,10 +63,14 @@ pub fn read(path: &Path, settings: &mut Settings) -> Result<bool, Failure> {
     if !(file.merge_radius >= 0.0 && file.merge_radius.is_finite()) {
         return Err(wrong(format!("merge_radius is {}, expected a length of at least 0", file.merge_radius)));
     }
+    if !(0.0..=1.0).contains(&file.faint_branches) {
+        return Err(wrong(format!("faint_branches is {}, expected 0 to 1", file.faint_branches)));
+    }
     settings.techniques = techniques;
     settings.light_paths = (file.light_paths > 0).then_some(file.light_paths);
     settings.connections = file.connections;
     settings.merge_radius = Some(file.merge_radius);
+    settings.faint = file.faint_branches;
     settings.automatic = false;
     Ok(true)
 }

@@ -15,7 +15,7 @@ use crate::report::memory;
 use crate::scene::Scene;
 use crate::transport::class::PathFilter;
 use crate::transport::mis::Heuristic;
-use crate::transport::settings::{Coupling, Plan, Techniques};
+use crate::transport::settings::{Coupling, FAINT, Plan, Techniques};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::Write;
@@ -154,7 +154,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     s.light_paths = t.light_paths;
     s.connections = t.connections;
     s.guided = !t.no_guide;
-    s.branching = !t.no_branching;
+    s.faint = if t.no_branching { 1.0 } else { FAINT };
     s.stratified = t.sampler == SamplerName::Stratified;
     s.seed = args.seed.unwrap_or(opened.scene.seed);
     (estimator, options)
@@ -392,7 +392,7 @@ impl Job<'_> {
             "connections": set.connections,
             "merge_radius": render.plan().merge_radius,
             "guided": set.guided,
-            "branching": set.branching,
+            "faint_branches": set.faint,
             "stratified": set.stratified,
             "seed": set.seed,
             "width": film.width(),

@@ -126,12 +126,13 @@ impl Options {
         let mut h = blake3::Hasher::new();
         h.update(&scene.hash());
         h.update(&[t.hit, t.next_event, t.splat, t.connect, t.merge].map(u8::from));
-        let switches = [s.heuristic == Heuristic::Power, s.hide_emitters, s.guided, s.automatic, s.stratified, s.branching];
+        let switches = [s.heuristic == Heuristic::Power, s.hide_emitters, s.guided, s.automatic, s.stratified];
         h.update(&switches.map(u8::from));
         h.update(format!("{:?}", s.coupling).as_bytes());
         for n in [s.min_length, s.max_length, s.rr_depth, s.connections] {
             h.update(&n.to_le_bytes());
         }
+        h.update(&s.faint.to_le_bytes());
         h.update(&s.merge_radius.map_or(u32::MAX, f32::to_bits).to_le_bytes());
         h.update(&s.light_paths.map_or(u64::MAX, u64::from).to_le_bytes());
         h.update(&s.seed.to_le_bytes());

@@ -15,9 +15,7 @@ use crate::scene::EmitterId;
 use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::Ray;
 
-/// Branches that carry less than this share of the pixel are followed with a probability only.
-const FAINT: f32 = 1e-2;
-/// So are all after so many events, where mirrors could go on for ever,
+/// After so many events, where mirrors could go on for ever, branches are followed with a probability only,
 const LONG: u32 = 16;
 /// with this one.
 const GOES_ON: f32 = 0.9;
@@ -53,12 +51,13 @@ pub fn follow<R: Record, O: Observe>(
     while let Some(mut branch) = open.take() {
         // Radiance is scaled by η² inside glass, what it carries is not.
         let share = branch.throughput.max_lane() * branch.eta * branch.eta / weight;
-        if share < FAINT {
+        let faint = plan.settings.faint;
+        if share < faint {
             // Not so for NaN, which ends here.
-            if !(random.unit() * FAINT < share) {
+            if !(random.unit() * faint < share) {
                 continue;
             }
-            branch.throughput *= FAINT / share;
+            branch.throughput *= faint / share;
         }
         if branch.length > LONG {
             if random.unit() >= GOES_ON {
@@ -71,6 +70,7 @@ pub fn follow<R: Record, O: Observe>(
             tally.observe.arrived(surface);
             tally.observe.scattered(event);
         }
+        tally.observe.followed(share);
         tally.rays.gather += 1;
         let Some(hit) = scene.geometry.intersect(&branch.ray) else {
             scene.lights.environment(branch.ray.d, |emitter, radiance| {

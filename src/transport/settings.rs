@@ -95,6 +95,9 @@ pub enum Coupling {
     },
 }
 
+/// Default of [`Settings::faint`].
+pub const FAINT: f32 = 1e-2;
+
 /// Everything that decides what is estimated and by which joins.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -122,8 +125,9 @@ pub struct Settings {
     pub automatic: bool,
     /// Light paths start where a pilot found that they matter.
     pub guided: bool,
-    /// Chains of Dirac events from the eye to a light are followed in all their branches ([`super::chain`]).
-    pub branching: bool,
+    /// Branches of a chain of Dirac events from the eye to a light ([`super::chain`]) that carry less than this
+    /// share of the pixel are followed with a probability only; 1: a walk takes one way at random.
+    pub faint: f32,
     /// Classes of paths that count.
     pub paths: PathFilter,
     /// Walks fill the space of their first decisions evenly.
@@ -157,7 +161,7 @@ impl Default for Settings {
             merge_radius: None,
             automatic: false,
             guided: true,
-            branching: true,
+            faint: FAINT,
             paths: PathFilter::default(),
             stratified: true,
             seed: 0,

@@ -252,6 +252,8 @@ pub trait Observe {
     fn scattered(&mut self, _s: &Scatter) {}
     /// The walk goes back and branches: all but the first `vertices` vertices are forgotten.
     fn returned(&mut self, _vertices: usize) {}
+    /// A branch of a chain goes on, which carries this share of the pixel (before roulette made it more).
+    fn followed(&mut self, _share: f32) {}
     /// A path was finished.
     fn joined(&mut self, _join: Join<'_>) {}
 }

@@ -6,7 +6,7 @@ use nephroid::render::{Budget, Control, Options, Render};
 use nephroid::report::agreement::agreement;
 use nephroid::scene::Scene;
 use nephroid::transport::class::PathFilter;
-use nephroid::transport::settings::{Settings, Techniques};
+use nephroid::transport::settings::{FAINT, Settings, Techniques};
 
 /// A lamp of radiance 1 behind a plate of index 4.
 const PLATE: &str = r#"<scene version="3.0.0">
@@ -20,7 +20,7 @@ const PLATE: &str = r#"<scene version="3.0.0">
 </scene>"#;
 
 /// A small bright lamp in a globe of glass, as seen from outside.
-const GLOBE: &str = r#"<scene version="3.0.0">
+pub const GLOBE: &str = r#"<scene version="3.0.0">
 <sensor type="perspective"><float name="fov" value="28"/>
   <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
   <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
@@ -33,7 +33,7 @@ const GLOBE: &str = r#"<scene version="3.0.0">
 fn settings(techniques: &str, branching: bool, add: u64) -> Settings {
     Settings {
         techniques: Techniques::parse(techniques).unwrap(),
-        branching,
+        faint: if branching { FAINT } else { 1.0 },
         rr_depth: 4,
         seed: seed() * 1000 + 800 + add,
         ..Settings::default()

@@ -1,12 +1,12 @@
 //! What a pilot chooses: joins that find nothing go, what only one join finds keeps it, and the choice
 //! changes no expectation.
 
-use crate::scenes;
 use crate::support::{BLOCK, scene, seed};
+use crate::{chains, scenes};
 use nephroid::render::{Budget, Control, Estimator, Options, Render};
 use nephroid::report::agreement::{BlockSeries, agreement};
 use nephroid::scene::Scene;
-use nephroid::transport::settings::{Plan, Settings, Techniques};
+use nephroid::transport::settings::{FAINT, Plan, Settings, Techniques};
 
 fn automatic(world: &Scene, seed: u64) -> Options {
     let mut options = Options::for_scene(world, Estimator::Auto);
@@ -62,6 +62,17 @@ fn merges_stay_where_nothing_else_sees() {
     assert!(wet.settings.techniques.merge && wet.merge_radius > 0.0);
     let dry = chosen(&scenes::named(dir.path(), "diffuse box"));
     assert!(!dry.settings.techniques.merge);
+}
+
+#[test]
+fn fainter_branches_are_followed_where_a_lamp_is_bright() {
+    // Reflections of a thousand times the room's radiance, none at all, and none wanted.
+    assert!(chosen(chains::GLOBE).settings.faint < FAINT);
+    assert_eq!(chosen(&room(BULB)).settings.faint, FAINT);
+    let world = scene(chains::GLOBE);
+    let mut options = automatic(&world, seed());
+    options.settings.faint = 1.0;
+    assert_eq!(Render::new(&world, &options).unwrap().plan().settings.faint, 1.0);
 }
 
 /// Block means of independent renders.

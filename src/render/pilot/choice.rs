@@ -16,6 +16,7 @@
 //! Costs are counts of operations times fixed weights ([`Costs`]), so that the choice is a
 //! function of scene, settings and seed alone.
 
+use super::branching::{Branches, Branching, LEAST};
 use super::{Cell, Decisions, JOB, Pilot};
 use crate::math::Random;
 use crate::math::random::Family;
@@ -41,8 +42,10 @@ const LOST: f64 = 1e-5;
 const MERGE_MUST_WIN: f64 = 1.25;
 /// Everything is on unless doing without wins by this factor: the estimate has noise itself.
 const LESS_MUST_WIN: f64 = 1.02;
-/// A single path counts for at most so many times the mean.
-const MOST: f64 = 300.0;
+/// A single path counts for at most this part of all: one that luck found must not decide.
+const MOST: f64 = 5e-3;
+/// Steps towards the bound of what a path can say.
+const CLIPPINGS: u32 = 16;
 
 /// Cost of operations, in units of a step of a gathering walk: user time of passes of five scenes with and
 /// without each join, divided by its counts. Only ratios matter, and only as far as they change the order of candidates.
@@ -56,6 +59,7 @@ struct Costs {
     shoot_step: f64,
     splat: f64,
     keep: f64,
+    branch: f64,
 }
 const COSTS: Costs = Costs {
     gather_walk: 1.7,
@@ -67,6 +71,7 @@ const COSTS: Costs = Costs {
     shoot_step: 1.0,
     splat: 0.8,
     keep: 0.4,
+    branch: 1.2,
 };
 
 /// Operations per walk.
@@ -88,6 +93,8 @@ struct Evidence {
     shares: [f64; Technique::ALL.len()],
     /// Without noise where next events are on: a delta light seen at the first vertex.
     steady: bool,
+    /// Share of the pixel that its chain carries, where it is one of [`crate::transport::chain`].
+    chain: Option<f32>,
 }
 
 /// Numbers of joins that could be used.
@@ -128,7 +135,7 @@ impl Candidate {
             Technique::Merge => n * on(self.merge),
         });
         let one = |e: &Evidence| {
-            if e.steady && self.next_event {
+            if (e.steady && self.next_event) || e.chain.is_some() {
                 return 0.0;
             }
             let rho: f64 = e.shares.iter().zip(numbers).map(|(r, n)| r * n).sum();
@@ -179,6 +186,11 @@ impl Record for Splats {
 struct Watch {
     witness: Witness,
     counts: Counts,
+    branches: Branches,
+    /// Share of the branch that is followed.
+    share: Option<f32>,
+    /// Shares of what was seen on branches, by its place among all that was seen.
+    chains: Vec<(usize, f32)>,
     /// The vertex last reached has not scattered.
     pending: bool,
 }
@@ -186,6 +198,7 @@ impl Observe for Watch {
     fn started(&mut self, from: Vec3, light: Option<&crate::scene::emitter::Emission>) {
         self.counts.walks += 1.0;
         self.pending = false;
+        self.share = None;
         self.witness.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
@@ -205,16 +218,25 @@ impl Observe for Watch {
         // Nothing is joined at the end of a branch.
         self.counts.ends -= if self.pending { 1.0 } else { 0.0 };
         self.pending = false;
+        self.share = None;
         self.witness.returned(vertices);
     }
+    fn followed(&mut self, share: f32) {
+        self.branches.count(share);
+        self.share = Some(share);
+    }
     fn joined(&mut self, join: Join<'_>) {
+        let before = self.witness.seen.len();
         self.witness.joined(join);
+        if let (Some(share), true) = (self.share, self.witness.seen.len() > before) {
+            self.chains.push((before, share));
+        }
     }
 }
 
 impl Watch {
     fn new(witness: Witness) -> Self {
-        Self { witness, counts: Counts::default(), pending: false }
+        Self { witness, counts: Counts::default(), branches: Branches::default(), share: None, chains: vec![], pending: false }
     }
 }
 
@@ -223,6 +245,7 @@ impl Watch {
 struct Found {
     evidence: Vec<Evidence>,
     counts: Counts,
+    branches: Branches,
     merges: f64,
 }
 
@@ -233,6 +256,7 @@ impl Found {
         self.counts.steps += other.counts.steps;
         self.counts.ends += other.counts.ends;
         self.merges += other.merges;
+        self.branches.join(other.branches);
         self
     }
 
@@ -246,7 +270,10 @@ impl Found {
 pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Settings {
     let mut plan = pilot.plan(decisions);
     plan.settings.heuristic = Heuristic::Balance;
-    let squares = pilot.squares();
+    if pilot.settings.faint < 1.0 {
+        plan.settings.faint = LEAST;
+    }
+    let (squares, dark_squares) = (pilot.squares(), pilot.dark_squares());
     let share = f64::from(paths) / f64::from(plan.light_paths.max(1));
     let tell = |cx: Context<'_>, t: &Testimony, cell: Cell, often: f64| evidence(cx, t, squares[cell as usize], often);
 
@@ -268,7 +295,7 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
             let seen = watch.witness.seen.iter().zip(&splats.0);
             let evidence =
                 seen.filter_map(|(t, raster)| pilot.cell(*raster).and_then(|cell| tell(cx, t, cell, 1.0 / share))).collect();
-            let found = Found { evidence, counts: watch.counts, merges: 0.0 };
+            let found = Found { evidence, counts: watch.counts, ..Found::default() };
             (found, vertices, watch.witness.into_subpaths())
         })
         .collect();
@@ -295,14 +322,19 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
                 let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut watch };
                 gather(cx, raster, 1.0, &cache, &mut random, &mut tally);
                 let Some(cell) = pilot.cell(raster) else { continue };
-                for t in watch.witness.seen.drain(..) {
+                let mut chains = watch.chains.drain(..).peekable();
+                for (i, t) in watch.witness.seen.drain(..).enumerate() {
+                    let chain = chains.next_if(|(at, _)| *at == i).map(|(_, share)| share);
                     let merge = t.key.0 == Technique::Merge;
                     merges += if merge { 1.0 / share } else { 0.0 };
-                    evidence.extend(tell(cx, &t, cell, if merge { 1.0 } else { 1.0 / share }));
+                    let told = tell(cx, &t, cell, if merge { 1.0 } else { 1.0 / share });
+                    // A lamp's image shines on its cell alone, its reflections on dark ones around it.
+                    let darker = if chain.is_some() { squares[cell as usize] / dark_squares[cell as usize] } else { 1.0 };
+                    evidence.extend(told.map(|e| Evidence { chain, square: e.square * darker, ..e }));
                 }
             }
-            watch.counts.steps = rays.gather as f64;
-            Found { evidence, counts: watch.counts, merges }
+            watch.counts.steps = rays.gather as f64 - watch.branches.all;
+            Found { evidence, counts: watch.counts, branches: watch.branches, merges }
         })
         .collect();
     let eye = gathered.into_iter().fold(Found::default(), Found::join);
@@ -311,20 +343,31 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
     let mut evidence = eye.evidence;
     evidence.extend(shot.evidence);
     clip(&mut evidence);
-    let judge = |c: &Candidate| {
+    let chains = evidence.iter().filter_map(|e| e.chain.map(|share| (e.square, share)));
+    let branchings = eye.branches.judged(pilot.settings.faint, chains, walks);
+    let candidates = Candidate::all(pilot.settings, pixels);
+    let judged = candidates.iter().flat_map(|c| {
         let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };
         let lacks = if c.next_event && c.connect { 1.0 } else { LESS_MUST_WIN };
-        c.noise(&evidence) * c.cost(&eye_counts, &light_counts, merges) * blurs * lacks
-    };
-    let candidates = Candidate::all(pilot.settings, pixels);
-    let best = candidates.iter().min_by(|a, b| judge(a).total_cmp(&judge(b)));
-    best.map_or_else(|| pilot.settings.clone(), |c| c.settings(pilot.settings, pixels))
+        let (noise, cost) = (c.noise(&evidence), c.cost(&eye_counts, &light_counts, merges));
+        let judge = move |b: &Branching| ((noise + b.noise) * (cost + COSTS.branch * b.rays) * blurs * lacks, c, b.faint);
+        branchings.iter().map(judge)
+    });
+    let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or_else(|| pilot.settings.clone(), |(_, c, faint)| Settings { faint, ..c.settings(pilot.settings, pixels) })
 }
 
-/// Limits what a single path can say.
+/// Limits what a single path can say; chains are all found, none by luck.
 fn clip(evidence: &mut [Evidence]) {
-    let most = MOST * evidence.iter().map(|e| e.square).sum::<f64>() / evidence.len().max(1) as f64;
-    evidence.iter_mut().for_each(|e| e.square = e.square.min(most));
+    let by_luck = |e: &&Evidence| e.chain.is_none();
+    // Of few, each may be twice their mean.
+    let part = MOST.max(2.0 / evidence.iter().filter(by_luck).count().max(1) as f64);
+    let mut most = f64::INFINITY;
+    // Falls to the value that is the wanted part of the sum it leaves.
+    for _ in 0..CLIPPINGS {
+        most = part * evidence.iter().filter(by_luck).map(|e| e.square.min(most)).sum::<f64>();
+    }
+    evidence.iter_mut().filter(|e| e.chain.is_none()).for_each(|e| e.square = e.square.min(most));
 }
 
 fn evidence(cx: Context<'_>, t: &Testimony, square: f64, often: f64) -> Option<Evidence> {
@@ -337,5 +380,30 @@ fn evidence(cx: Context<'_>, t: &Testimony, square: f64, often: f64) -> Option<E
         shares[technique as usize] += weight;
     }
     let steady = t.path.light_delta && t.path.vertices.len() == 1;
-    shares.iter().sum::<f64>().is_finite().then_some(Evidence { square: often * value * value / square, shares, steady })
+    shares.iter().sum::<f64>().is_finite().then_some(Evidence {
+        square: often * value * value / square,
+        shares,
+        steady,
+        chain: None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn luck_does_not_decide() {
+        let of = |square| Evidence { square, shares: [1.0, 0.0, 0.0, 0.0, 0.0], steady: false, chain: None };
+        let mut evidence: Vec<Evidence> = (0..1000).map(|_| of(1.0)).collect();
+        clip(&mut evidence);
+        assert!(evidence.iter().all(|e| e.square == 1.0));
+        evidence.push(of(1e12));
+        clip(&mut evidence);
+        // A two-hundredth of all, itself included.
+        assert!((evidence[1000].square - 5.0).abs() < 0.1, "{}", evidence[1000].square);
+        let mut few = vec![of(1.0), of(1e12), of(1.0)];
+        clip(&mut few);
+        assert!(few[1].square <= 1e12 && few[0].square == 1.0);
+    }
 }

@@ -9,6 +9,7 @@
 //! draws from its own family of random numbers and sums in a fixed order, so it is a function of
 //! scene, settings and seed alone, the same for all shards of a render.
 
+mod branching;
 mod choice;
 
 use crate::math::Random;
@@ -119,6 +120,7 @@ impl Decisions {
         bytes.extend(self.settings.light_paths.unwrap_or(0).to_le_bytes());
         bytes.extend(self.vertices_per_path.to_bits().to_le_bytes());
         bytes.extend(self.merge_radius.to_bits().to_le_bytes());
+        bytes.extend(self.settings.faint.to_bits().to_le_bytes());
         bytes
     }
 }
@@ -243,7 +245,7 @@ impl<'a> Pilot<'a> {
     /// can be merged, so that merging blurs less than the film does.
     fn merge_radius(&self) -> f32 {
         let techniques = Techniques { next_event: false, ..Techniques::GATHER };
-        let settings = Settings { techniques, branching: false, ..self.settings.clone() };
+        let settings = Settings { techniques, faint: 1.0, ..self.settings.clone() };
         let plan = Plan::new(&settings, 1, 1, 0.0);
         let jobs = (0..SCOUTS / JOB).into_par_iter().map(|job| {
             let mut footprints = Footprints { parallel: self.scene.sensor.is_orthographic(), ..Footprints::default() };
@@ -334,9 +336,29 @@ impl<'a> Pilot<'a> {
             let (sum, pixels) = cells.fold((0.0, 0.0), |(s, p), c| (s + self.image[c as usize], p + self.cell_pixels(c)));
             sum / (self.weight * pixels)
         };
+        self.each_cell(radiance)
+    }
+
+    /// Squares of a radiance of each cell, and a little more.
+    fn each_cell(&self, radiance: impl Fn((u32, u32)) -> f64) -> Vec<f64> {
+        let [columns, rows] = self.cells;
         let mean = self.image.iter().sum::<f64>() / (self.weight * f64::from(self.crop[2]) * f64::from(self.crop[3]));
         let all = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
         all.map(|at| radiance(at).powi(2) + 0.01 * mean * mean).collect()
+    }
+
+    /// The same from the median of the cells around: beside something far brighter, what the dark ones have.
+    fn dark_squares(&self) -> Vec<f64> {
+        let [columns, rows] = self.cells;
+        let around = |at: u32, size: u32| at.saturating_sub(BLUR)..(at + BLUR + 1).min(size);
+        let radiance = |(x, y): (u32, u32)| {
+            let cell = |c: u32| self.image[c as usize] / (self.weight * self.cell_pixels(c));
+            let cells = around(y, rows).flat_map(|y| around(x, columns).map(move |x| y * columns + x));
+            let mut all: Vec<f64> = cells.map(cell).collect();
+            let middle = all.len() / 2;
+            *all.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        self.each_cell(radiance)
     }
 
     /// √Σ (v/I)² of each light path over its contributions.
