@@ -4,6 +4,7 @@ pub mod distribution;
 pub mod frame;
 pub mod quadtree;
 pub mod random;
+mod sobol;
 pub mod warp;
 
 pub use frame::Frame;

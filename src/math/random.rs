@@ -9,6 +9,7 @@
 //! them still being uniformly distributed. Code that decides something in the same order in all walks
 //! asks for an axis; code that may or may not run, for a free number.
 
+use super::sobol::{FOURS, Point};
 use glam::Vec2;
 use rand::Rng;
 use rand_pcg::Pcg32;
@@ -17,14 +18,13 @@ use rand_pcg::Pcg32;
 #[derive(Clone, Debug)]
 pub struct Random {
     free: Pcg32,
-    point: Point,
+    point: Axes,
 }
 
 /// How far the axes of a point of a sequence are used up.
 #[derive(Clone, Debug, Default)]
-struct Point {
-    index: u32,
-    seed: u32,
+struct Axes {
+    of: Point,
     /// Dimensions given out, and how many there are (a multiple of four).
     next: u32,
     end: u32,
@@ -64,16 +64,17 @@ impl Random {
     pub fn new(family: Family, index: u64, sample: u64, seed: u64) -> Self {
         let a = mix(seed ^ mix(((family as u64) << 56) ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
         let b = mix(a ^ sample.wrapping_mul(0xd1b5_4a32_d192_ed03));
-        Self { free: Pcg32::new(b, a), point: Point::default() }
+        Self { free: Pcg32::new(b, a), point: Axes::default() }
     }
 
-    /// The same stream, its first `axes` axes (a multiple of four) those of point `point` of the sequence
+    /// The same stream, its first `axes` axes (a multiple of four, at most sixteen) those of point `point` of the sequence
     /// that belongs to `index` of `family`.
     #[inline]
     pub fn with_point(mut self, family: Family, index: u64, point: u64, seed: u64, axes: u32) -> Self {
         let sequence = index ^ (point / SEQUENCE).rotate_right(16);
         let seed = mix(seed ^ mix(!((family as u64) << 56) ^ sequence.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
-        self.point = Point { index: (point % SEQUENCE) as u32, seed: seed as u32, next: 0, end: axes, four: [0.0; 4] };
+        let of = Point::new((point % SEQUENCE) as u32, seed as u32);
+        self.point = Axes { of, next: 0, end: axes.min(4 * FOURS), four: [0.0; 4] };
         self
     }
 
@@ -85,7 +86,7 @@ impl Random {
             return self.unit();
         }
         if p.next.is_multiple_of(4) {
-            p.four = sobol_burley::sample_4d(p.index, p.next / 4, p.seed);
+            p.four = p.of.axes(p.next / 4);
         }
         p.next += 1;
         p.four[(p.next as usize - 1) % 4]

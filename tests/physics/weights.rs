@@ -2,7 +2,7 @@
 
 use crate::scenes;
 use crate::support::{learned, scene, seed};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use nephroid::math::Random;
 use nephroid::math::random::Family;
 use nephroid::scene::emitter::Guide;
@@ -100,7 +100,32 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
     (world, plan, witness.seen)
 }
 
-/// What is wrong with the weights of walks: those that are more than 1e-3 from their definition.
+/// Rays start off their surfaces by so many times the rounding of the point.
+const OFFSET: f32 = 32.0;
+
+/// How far the defined weight of a path moves when its vertices move as far as rays start off them: directions taken
+/// from positions are no better known than that, which matters on short or grazing edges, beside small lamps, and
+/// where a learned density steps.
+fn conditioning(cx: Context<'_>, t: &Testimony, w: f64) -> f64 {
+    let mut random = Random::new(Family::Other, 8, 0, seed());
+    let mut moved = |p: Vec3, error: f32| {
+        let mut off = || 2.0 * random.unit() - 1.0;
+        p + Vec3::new(off(), off(), off()) * (OFFSET * error)
+    };
+    let deviation = |_| {
+        let mut path = t.path.clone();
+        for v in &mut path.vertices {
+            v.surface.p = moved(v.surface.p, v.surface.p_error);
+        }
+        path.light.y = moved(path.light.y, path.light.y_error);
+        let weights = path.weights(cx);
+        weights.iter().find(|w| w.0 == t.key).map_or(0.0, |other| (other.1 - w).abs())
+    };
+    (0..32).map(deviation).fold(0.0, f64::max)
+}
+
+/// What is wrong with the weights of walks: those that are more than 1e-3 from their definition, and further than
+/// rounding explains.
 fn differing(world: &nephroid::scene::Scene, plan: &Plan, seen: &[Testimony]) -> Vec<String> {
     let mut bad = Vec::new();
     for t in seen {
@@ -113,7 +138,8 @@ fn differing(world: &nephroid::scene::Scene, plan: &Plan, seen: &[Testimony]) ->
         };
         assert!(t.weight.is_finite());
         let tolerance = 1e-3 * w.max(1e-6);
-        if *w > 1e-6 && (f64::from(t.weight) - w).abs() > tolerance {
+        let error = (f64::from(t.weight) - w).abs();
+        if *w > 1e-6 && error > tolerance && error > 2.0 * conditioning(Context::new(world, plan, 0), t, *w) {
             bad.push(format!("{:?} k = {}: {} instead of {w}; all {all:?}", t.key, t.path.vertices.len() + 1, t.weight));
         }
     }
