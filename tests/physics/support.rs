@@ -41,6 +41,8 @@ struct Blocks {
     crop: [u32; 4],
     columns: usize,
     sums: Vec<Vec<f64>>,
+    /// The largest contribution, by path length.
+    largest: Vec<f64>,
     at: (u32, u32),
 }
 
@@ -53,7 +55,9 @@ impl Blocks {
         let block = (y as usize / BLOCK as usize) * self.columns + x as usize / BLOCK as usize;
         assert!(c.value.is_finite(), "a contribution is not finite: {c:?}");
         if let Some(sums) = self.sums.get_mut(c.length as usize) {
-            sums[block] += f64::from(c.value.mean());
+            let value = f64::from(c.value.mean());
+            sums[block] += value;
+            self.largest[c.length as usize] = self.largest[c.length as usize].max(value);
         }
     }
 }
@@ -86,11 +90,12 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
     // Any constant is a valid number of vertices for the weights.
     let guide = if settings.guided { learned(scene, &settings) } else { Guide::default() };
     let plan = Plan { guide, ..Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0) };
-    let renders: Vec<Vec<Vec<f64>>> = (0..effort.renders)
+    let renders: Vec<Blocks> = (0..effort.renders)
         .into_par_iter()
         .map(|render| {
             let sums = vec![vec![0.0; columns * rows]; effort.max_length as usize + 1];
-            let mut blocks = Blocks { crop, columns, sums, at: (0, 0) };
+            let largest = vec![0.0; sums.len()];
+            let mut blocks = Blocks { crop, columns, sums, largest, at: (0, 0) };
             let mut rays = RayCounts::default();
             let mut tally = Tally { record: &mut blocks, rays: &mut rays, observe: &mut () };
             for pass in render * effort.passes..(render + 1) * effort.passes {
@@ -115,10 +120,18 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
                     }
                 }
             }
-            blocks.sums
+            blocks
         })
         .collect();
+    // Blocks that wait for a contribution as large as the largest look calm and are too low.
+    let largest = |k: usize| renders.iter().map(|r| r.largest[k]).fold(0.0, f64::max);
     (0..=effort.max_length as usize)
-        .map(|k| BlockSeries { columns, rows, draws: renders.iter().map(|r| r[k].clone()).collect(), ..BlockSeries::default() })
+        .map(|k| BlockSeries {
+            columns,
+            rows,
+            draws: renders.iter().map(|r| r.sums[k].clone()).collect(),
+            largest: largest(k),
+            heavy: false,
+        })
         .collect()
 }
