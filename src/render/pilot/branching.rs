@@ -27,12 +27,12 @@ pub(super) struct Branching {
 
 /// Rays of branches for each of [`FAINTEST`], and those that the pilot followed.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Branches {
+pub(super) struct BranchRays {
     of: [f64; FAINTEST.len()],
     pub(super) all: f64,
 }
 
-impl Branches {
+impl BranchRays {
     /// A ray of a branch that carries `share` of its pixel.
     pub(super) fn count(&mut self, share: f32) {
         self.all += 1.0;

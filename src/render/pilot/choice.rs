@@ -16,7 +16,7 @@
 //! Costs are counts of operations times fixed weights ([`Costs`]), so that the choice is a
 //! function of scene, settings and seed alone.
 
-use super::branching::{Branches, Branching, LEAST};
+use super::branching::{BranchRays, Branching, LEAST};
 use super::{Cell, Decisions, JOB, Pilot};
 use crate::math::Random;
 use crate::math::random::Family;
@@ -186,7 +186,7 @@ impl Record for Splats {
 struct Watch {
     witness: Witness,
     counts: Counts,
-    branches: Branches,
+    branches: BranchRays,
     /// Share of the branch that is followed.
     share: Option<f32>,
     /// Shares of what was seen on branches, by its place among all that was seen.
@@ -236,7 +236,7 @@ impl Observe for Watch {
 
 impl Watch {
     fn new(witness: Witness) -> Self {
-        Self { witness, counts: Counts::default(), branches: Branches::default(), share: None, chains: vec![], pending: false }
+        Self { witness, counts: Counts::default(), branches: BranchRays::default(), share: None, chains: vec![], pending: false }
     }
 }
 
@@ -245,7 +245,7 @@ impl Watch {
 struct Found {
     evidence: Vec<Evidence>,
     counts: Counts,
-    branches: Branches,
+    branches: BranchRays,
     merges: f64,
 }
 
@@ -404,6 +404,6 @@ mod tests {
         assert!((evidence[1000].square - 5.0).abs() < 0.1, "{}", evidence[1000].square);
         let mut few = vec![of(1.0), of(1e12), of(1.0)];
         clip(&mut few);
-        assert!(few[1].square <= 1e12 && few[0].square == 1.0);
+        assert!(few[1].square < 1e10 && few[0].square == 1.0, "{}", few[1].square);
     }
 }

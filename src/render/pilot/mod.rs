@@ -329,14 +329,19 @@ impl<'a> Pilot<'a> {
     /// A cell has seen few walks, so it is taken together with those around it: where it was missed by
     /// chance, the first contribution would seem enormous.
     fn squares(&self) -> Vec<f64> {
-        let [columns, rows] = self.cells;
-        let around = |at: u32, size: u32| at.saturating_sub(BLUR)..(at + BLUR + 1).min(size);
-        let radiance = |(x, y): (u32, u32)| {
-            let cells = around(y, rows).flat_map(|y| around(x, columns).map(move |x| y * columns + x));
-            let (sum, pixels) = cells.fold((0.0, 0.0), |(s, p), c| (s + self.image[c as usize], p + self.cell_pixels(c)));
+        self.each_cell(|at| {
+            let add = |(s, p): (f64, f64), c: u32| (s + self.image[c as usize], p + self.cell_pixels(c));
+            let (sum, pixels) = self.around(at).fold((0.0, 0.0), add);
             sum / (self.weight * pixels)
-        };
-        self.each_cell(radiance)
+        })
+    }
+
+    /// The cells around one, itself included.
+    fn around(&self, (x, y): (u32, u32)) -> impl Iterator<Item = u32> {
+        let [columns, rows] = self.cells;
+        let near = |at: u32, size: u32| at.saturating_sub(BLUR)..(at + BLUR + 1).min(size);
+        let row = near(x, columns);
+        near(y, rows).flat_map(move |y| row.clone().map(move |x| y * columns + x))
     }
 
     /// Squares of a radiance of each cell, and a little more.
@@ -349,16 +354,12 @@ impl<'a> Pilot<'a> {
 
     /// The same from the median of the cells around: beside something far brighter, what the dark ones have.
     fn dark_squares(&self) -> Vec<f64> {
-        let [columns, rows] = self.cells;
-        let around = |at: u32, size: u32| at.saturating_sub(BLUR)..(at + BLUR + 1).min(size);
-        let radiance = |(x, y): (u32, u32)| {
-            let cell = |c: u32| self.image[c as usize] / (self.weight * self.cell_pixels(c));
-            let cells = around(y, rows).flat_map(|y| around(x, columns).map(move |x| y * columns + x));
-            let mut all: Vec<f64> = cells.map(cell).collect();
+        self.each_cell(|at| {
+            let radiance = |c: u32| self.image[c as usize] / (self.weight * self.cell_pixels(c));
+            let mut all: Vec<f64> = self.around(at).map(radiance).collect();
             let middle = all.len() / 2;
             *all.select_nth_unstable_by(middle, f64::total_cmp).1
-        };
-        self.each_cell(radiance)
+        })
     }
 
     /// √Σ (v/I)² of each light path over its contributions.
