@@ -14,11 +14,12 @@ mod support;
 
 use nephroid::proof::adjoint::{ALPHA, Effort as Draws, adjoint};
 use nephroid::proof::residual;
+use nephroid::render::Options;
 use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
 use nephroid::transport::settings::{FAINT, Settings, Techniques};
-use support::{Effort, scene, seed, series};
+use support::{Effort, pictures, scene, seed, series};
 
 /// A mistake is planted for the whole process.
 static ONE_AT_A_TIME: std::sync::Mutex<()> = std::sync::Mutex::new(());
@@ -165,6 +166,30 @@ fn planted_mistakes_double_chains() {
         (2..=5).map(|k| agreement(&by_chance[k], &branched[k]).p).fold(1.0, f64::min)
     });
     println!("ChainTwice: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
+    assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
+}
+
+/// `chains::more_samples_of_chains_find_the_same_with_less_noise` notices samples that are not shared.
+#[test]
+fn planted_mistakes_multiply_chains() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), "glass and mirror"));
+    let of = |chain_samples: u32, first: u64| {
+        let settings = Settings { techniques: Techniques::GATHER, guided: false, chain_samples, ..Settings::default() };
+        pictures(&world, 40, |r| Options {
+            settings: Settings { seed: seed() * 1000 + first + r, ..settings.clone() },
+            ..Options::default()
+        })
+    };
+    let one = of(1, 0);
+    let [sound, mistaken] = [None, Some(Mutant::ChainPart)].map(|m| {
+        plant(m);
+        let many = of(4, 100);
+        plant(None);
+        agreement(&one, &many).p
+    });
+    println!("ChainPart: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
     assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
 }
 

@@ -10,6 +10,9 @@ use std::path::Path;
 /// A longer file is no plan.
 const MOST_BYTES: u64 = 65_536;
 
+/// So that a pass ends.
+const MOST_CHAIN_SAMPLES: u32 = 65_536;
+
 /// Joins and numbers of walks, as they stand in the file.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,10 +28,17 @@ struct PlanFile {
     /// Share of a pixel below which a branch between eye and lamp is left to chance; 1: all are.
     #[serde(default = "faint")]
     faint_branches: f32,
+    /// Of the paths between eye and lamp, per pixel and pass.
+    #[serde(default = "one")]
+    chain_samples: u32,
 }
 
 fn faint() -> f32 {
     FAINT
+}
+
+fn one() -> u32 {
+    1
 }
 
 /// As text, for files and for images' attributes.
@@ -40,6 +50,7 @@ pub fn text(plan: &Plan) -> String {
         connections: s.connections,
         merge_radius: plan.merge_radius,
         faint_branches: s.faint,
+        chain_samples: s.chain_samples,
     };
     serde_json::to_string(&file).unwrap_or_default()
 }
@@ -66,11 +77,15 @@ pub fn read(path: &Path, settings: &mut Settings) -> Result<bool, Failure> {
     if !(0.0..=1.0).contains(&file.faint_branches) {
         return Err(wrong(format!("faint_branches is {}, expected 0 to 1", file.faint_branches)));
     }
+    if !(1..=MOST_CHAIN_SAMPLES).contains(&file.chain_samples) {
+        return Err(wrong(format!("chain_samples is {}, expected 1 to {MOST_CHAIN_SAMPLES}", file.chain_samples)));
+    }
     settings.techniques = techniques;
     settings.light_paths = (file.light_paths > 0).then_some(file.light_paths);
     settings.connections = file.connections;
     settings.merge_radius = Some(file.merge_radius);
     settings.faint = file.faint_branches;
+    settings.chain_samples = file.chain_samples;
     settings.automatic = false;
     Ok(true)
 }

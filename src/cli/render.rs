@@ -393,6 +393,7 @@ impl Job<'_> {
             "merge_radius": render.plan().merge_radius,
             "guided": set.guided,
             "faint_branches": set.faint,
+            "chain_samples": 1 + render.plan().more_chains(),
             "stratified": set.stratified,
             "seed": set.seed,
             "width": film.width(),

@@ -48,6 +48,8 @@ pub enum Family {
     Other = 4,
     /// Rays of finite elements, indexed by element or ray.
     Elements = 5,
+    /// Samples of chains of Dirac events alone, indexed by pixel.
+    Chain = 6,
 }
 
 /// Mixes 64 bits so that every input bit reaches every output bit (finaliser of SplitMix64).

@@ -133,6 +133,7 @@ impl Options {
             h.update(&n.to_le_bytes());
         }
         h.update(&s.faint.to_le_bytes());
+        h.update(&s.chain_samples.to_le_bytes());
         h.update(&s.merge_radius.map_or(u32::MAX, f32::to_bits).to_le_bytes());
         h.update(&s.light_paths.map_or(u64::MAX, u64::from).to_le_bytes());
         h.update(&s.seed.to_le_bytes());

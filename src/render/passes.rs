@@ -6,6 +6,7 @@ use crate::film::{Layout, Splat, SplatBins};
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::transport::cache::{LightCache, LightVertex};
+use crate::transport::chain;
 use crate::transport::gather::gather;
 use crate::transport::recursive::recursive;
 use crate::transport::settings::{Coupling, Plan};
@@ -21,6 +22,8 @@ use std::time::Instant;
 pub const SHOOT_JOB: u32 = 4096;
 /// Emission and the first scattering of a light path; all light paths of a pass share a sequence.
 const SHOOT_AXES: u32 = 8;
+/// Film and lens of a sample of chains; all of a pixel share a sequence.
+const CHAIN_AXES: u32 = 4;
 /// Film, lens and the first vertices of a gathering walk; all passes of a pixel share a sequence.
 const GATHER_AXES: u32 = 16;
 
@@ -101,6 +104,13 @@ pub(crate) fn pixel_random(plan: &Plan, id: u64, pass: u64) -> Random {
     if plan.settings.stratified { random.with_point(Family::Gather, id, pass, seed, GATHER_AXES) } else { random }
 }
 
+/// The random numbers of sample `sample` of chains alone of the pixel with number `id` in the whole film.
+fn chain_random(plan: &Plan, id: u64, sample: u64) -> Random {
+    let seed = plan.settings.seed;
+    let random = Random::new(Family::Chain, id, sample, seed);
+    if plan.settings.stratified { random.with_point(Family::Chain, id, sample, seed, CHAIN_AXES) } else { random }
+}
+
 /// Shoots all light paths of a pass.
 fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat<S::Kept>>>) {
     let plan = &render.plan;
@@ -154,7 +164,8 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
             let rect = layout.tile_rect(index);
             let mut rays = RayCounts::default();
             for pass in passes.clone() {
-                let cx = Context::new(scene, plan, pass);
+                let more = plan.more_chains();
+                let cx = Context::new(scene, plan, pass).with_chain_samples(1 + more);
                 if let Some(bins) = bins {
                     for s in bins.tile(index) {
                         sink.add(Layout::local_of(s.pixel), &s.value);
@@ -165,8 +176,11 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
                         let (px, py) = (crop[0] + x, crop[1] + y);
                         let id = u64::from(py) * film_width + u64::from(px);
                         let mut random = pixel_random(plan, id, pass);
-                        let (offset, weight) = filter.sample_offset(random.axis2());
-                        let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
+                        let somewhere = |random: &mut Random| {
+                            let (offset, weight) = filter.sample_offset(random.axis2());
+                            (Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset, weight)
+                        };
+                        let (raster, weight) = somewhere(&mut random);
                         let mut record = PixelRecord { sink: &mut sink, local };
                         let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
                         let (r, t) = (&mut random, &mut tally);
@@ -174,6 +188,11 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
                             Coupling::All => gather(cx, raster, weight, cache, r, t),
                             Coupling::Specular => recursive(cx, raster, weight, true, r, t),
                             Coupling::None { shadows } => recursive(cx, raster, weight, shadows, r, t),
+                        }
+                        for i in 0..u64::from(more) {
+                            let mut random = chain_random(plan, id, pass * u64::from(more) + i);
+                            let (raster, weight) = somewhere(&mut random);
+                            chain::sample(cx, raster, weight, &mut random, &mut tally);
                         }
                     }
                 }

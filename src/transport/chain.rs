@@ -4,6 +4,9 @@
 //! mirrored twice in the glass around it, once in ten thousand samples, at its full radiance. So where such a
 //! walk comes to the first vertex at which it would have to choose, all chains from there are followed here
 //! instead, and the walk itself finds no light until a wider event.
+//!
+//! What is smaller than a pixel, a lamp mirrored in a handle, is still found by few samples, in the same full radiance.
+//! Chains are cheap, so a pixel can have more samples of them than walks ([`sample`]).
 
 use super::Record;
 use super::branch::{Branch, Branches};
@@ -14,6 +17,8 @@ use crate::math::Random;
 use crate::scene::EmitterId;
 use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::Ray;
+use crate::spectrum::Spectrum;
+use glam::Vec2;
 
 /// After so many events, where mirrors could go on for ever, branches are followed with a probability only,
 const LONG: u32 = 16;
@@ -31,8 +36,7 @@ pub fn follow<R: Record, O: Observe>(
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) -> bool {
-    let (scene, plan) = (cx.scene, cx.plan);
-    let filter = &plan.settings.paths;
+    let filter = &cx.plan.settings.paths;
     let mut open = Branches::new(u32::MAX);
     let here = Branch {
         ray: Ray { o: vertex.surface.p, d: vertex.w_back, t_max: 0.0 },
@@ -48,6 +52,45 @@ pub fn follow<R: Record, O: Observe>(
     if ways == 0 || (ways == 1 && vertex.closure.is_delta()) {
         return false;
     }
+    explore(cx, &mut open, weight, random, tally);
+    tally.observe.returned(walk.length as usize);
+    tally.observe.arrived(&vertex.surface);
+    true
+}
+
+/// One sample of all paths E S* L of the pixel seen at `raster`, `weight` the factor of its reconstruction filter.
+pub fn sample<R: Record, O: Observe>(
+    cx: Context<'_>,
+    raster: Vec2,
+    weight: f32,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let start = cx.scene.sensor.sample_ray(raster, random.axis2());
+    tally.observe.started(start.lens, None);
+    let mut open = Branches::new(u32::MAX);
+    open.start(Branch {
+        ray: Ray { o: start.o, d: start.d, t_max: start.t_max },
+        throughput: Spectrum::ONE * weight,
+        eta: 1.0,
+        length: 0,
+        class: cx.plan.settings.paths.eye(),
+        first_delta: false,
+        last_delta: false,
+        event: None,
+    });
+    explore(cx, &mut open, weight, random, tally);
+}
+
+/// Follows all that is open, and what becomes of it.
+fn explore<R: Record, O: Observe>(
+    cx: Context<'_>,
+    open: &mut Branches,
+    weight: f32,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
     while let Some(mut branch) = open.take() {
         // Radiance is scaled by η² inside glass, what it carries is not.
         let share = branch.throughput.max_lane() * branch.eta * branch.eta / weight;
@@ -83,12 +126,9 @@ pub fn follow<R: Record, O: Observe>(
             let point = EmitterPoint::on_surface(&surface);
             chain_hit(cx, &branch, &point, scene.lights.radiance(&point, -branch.ray.d), tally);
         }
-        if branch.length + 1 < plan.settings.max_length {
+        if branch.length + 1 < plan.settings.max_length && scene.materials.has_delta(surface.material) {
             tally.observe.arrived(&surface);
-            open.split(&branch, &Vertex::new(scene, surface, -branch.ray.d), filter, random);
+            open.split(&branch, &Vertex::new(scene, surface, -branch.ray.d), &plan.settings.paths, random);
         }
     }
-    tally.observe.returned(walk.length as usize);
-    tally.observe.arrived(&vertex.surface);
-    true
 }

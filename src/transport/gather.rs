@@ -210,7 +210,8 @@ fn hit<R: Record, O: Observe>(
         let k = if length == 2 && !plan.splat_direct { 0.0 } else { walk.k };
         mis::hit(plan.settings.heuristic, arrival.p_a, nu, e, k)
     };
-    let value = walk.throughput * radiance * weight;
+    let part = if walk.chain == Chain::Single { cx.chain_part } else { 1.0 };
+    let value = walk.throughput * radiance * (weight * part);
     arrived_on_light(cx, (walk.class, walk.first_delta, walk.delta), length, point, (value, weight), tally);
 }
 
@@ -226,7 +227,7 @@ pub(super) fn chain_hit<R: Record, O: Observe>(
     if radiance.is_black() || !cx.plan.wants_length(length) {
         return;
     }
-    let value = branch.throughput * radiance;
+    let value = branch.throughput * radiance * cx.chain_part;
     arrived_on_light(cx, (branch.class, branch.first_delta, branch.last_delta), length, point, (value, 1.0), tally);
 }
 

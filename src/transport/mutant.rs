@@ -24,6 +24,8 @@ pub enum Mutant {
     MergeWeight = 8,
     /// A walk whose chain was followed in all branches finds the light at its end once more.
     ChainTwice = 9,
+    /// A walk counts its chain in full beside the samples of chains of its pixel.
+    ChainPart = 10,
 }
 
 #[cfg(feature = "mutants")]

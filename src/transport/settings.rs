@@ -128,6 +128,9 @@ pub struct Settings {
     /// Branches of a chain of Dirac events from the eye to a light ([`super::chain`]) that carry less than this
     /// share of the pixel are followed with a probability only; 1: a walk takes one way at random.
     pub faint: f32,
+    /// Samples of chains of Dirac events between eye and light (E S* L) per pixel and pass, where branches are followed:
+    /// nothing but a hit finds them, so a reflection of a lamp that is smaller than a pixel needs many.
+    pub chain_samples: u32,
     /// Classes of paths that count.
     pub paths: PathFilter,
     /// Walks fill the space of their first decisions evenly.
@@ -162,6 +165,7 @@ impl Default for Settings {
             automatic: false,
             guided: true,
             faint: FAINT,
+            chain_samples: 1,
             paths: PathFilter::default(),
             stratified: true,
             seed: 0,
@@ -233,6 +237,12 @@ impl Plan {
     /// so that bias and variance of the mean both vanish [Knaus & Zwicker 2011, eq. 15].
     pub fn merge_radius(&self, pass: u64) -> f32 {
         self.merge_radius * ((pass + 1) as f32).powf(-1.0 / 6.0)
+    }
+
+    /// Samples of chains alone beside each gathering walk.
+    pub fn more_chains(&self) -> u32 {
+        let s = &self.settings;
+        if s.faint < 1.0 && s.techniques.hit && s.coupling == Coupling::All { s.chain_samples.saturating_sub(1) } else { 0 }
     }
 
     /// Shooting walks leave vertices for gathering walks.

@@ -30,6 +30,9 @@ pub struct Context<'a> {
     pub merge_radius2: f32,
     /// η of this pass: light paths times the area in which their vertices are merged.
     pub eta: f32,
+    /// Part of what comes along chains of Dirac events (E S* L) that a sample counts: where several samples of chains
+    /// belong to one gathering walk ([`super::chain::sample`]), one by their number.
+    pub chain_part: f32,
 }
 
 impl<'a> Context<'a> {
@@ -37,7 +40,12 @@ impl<'a> Context<'a> {
     pub fn new(scene: &'a Scene, plan: &'a Plan, pass: u64) -> Self {
         let merge_radius2 = plan.merge_radius(pass).powi(2);
         let eta = plan.light_paths as f32 * std::f32::consts::PI * merge_radius2;
-        Self { scene, plan, merge_radius2, eta }
+        Self { scene, plan, merge_radius2, eta, chain_part: 1.0 }
+    }
+
+    /// The same where a pixel has so many samples of chains.
+    pub fn with_chain_samples(self, samples: u32) -> Self {
+        Self { chain_part: if planted(Mutant::ChainPart) { 1.0 } else { 1.0 / samples as f32 }, ..self }
     }
 }
 

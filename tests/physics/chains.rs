@@ -1,9 +1,9 @@
 //! Chains of Dirac events between eye and light: all branches are followed, and none counts twice.
 
 use crate::scenes;
-use crate::support::{Effort, scene, seed, series};
+use crate::support::{Effort, pictures, scene, seed, series};
 use nephroid::render::{Budget, Control, Options, Render};
-use nephroid::report::agreement::agreement;
+use nephroid::report::agreement::{BlockSeries, agreement};
 use nephroid::scene::Scene;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::settings::{FAINT, Settings, Techniques};
@@ -125,4 +125,44 @@ fn chains_end_in_a_room_of_mirrors() {
     let mut render = Render::new(&world, &Options { settings: settings("hit", true, 62), ..Options::default() }).unwrap();
     render.run(&Budget::passes(1), |_| Control::Continue);
     assert!(render.picture().mean.iter().all(|p| p[0].is_finite()));
+}
+
+/// Pictures of chains with several samples beside each walk are those of walks alone: lamps seen directly, by mirrors, and
+/// through glass; and what is smaller than a pixel has less noise.
+#[test]
+fn more_samples_of_chains_find_the_same_with_less_noise() {
+    let dir = tempfile::tempdir().unwrap();
+    let mirrors = scenes::named(dir.path(), "glass and mirror");
+    for (i, (xml, paths)) in
+        [(mirrors.as_str(), "E S* L"), (mirrors.as_str(), "E .* L"), (GLOBE, "E S S S S+ L")].into_iter().enumerate()
+    {
+        let world = scene(xml);
+        let of = |chain_samples: u32| {
+            let first = 10_000 * i as u64 + 1000 * u64::from(chain_samples);
+            pictures(&world, 40, |r| Options {
+                settings: Settings {
+                    paths: PathFilter::parse(paths).unwrap(),
+                    chain_samples,
+                    max_length: 9,
+                    guided: false,
+                    ..settings("hit,nee", true, first + r)
+                },
+                ..Options::default()
+            })
+        };
+        let (one, eight) = (of(1), of(8));
+        let v = agreement(&one, &eight);
+        assert!(v.p > 1e-5 && v.energy_tested > 0.9, "{paths}: {:?}, p = {:.1e}", v.totals, v.p);
+        let variance = |s: &BlockSeries| {
+            let of_block = |b: usize| {
+                let mean = s.draws.iter().map(|d| d[b]).sum::<f64>() / s.draws.len() as f64;
+                s.draws.iter().map(|d| (d[b] - mean).powi(2)).sum::<f64>()
+            };
+            (0..s.columns * s.rows).map(of_block).sum::<f64>()
+        };
+        println!("{paths}: variance {:.3e}, {:.3e} with eight samples, p = {:.2e}", variance(&one), variance(&eight), v.p);
+        if paths != "E .* L" {
+            assert!(variance(&eight) < 0.4 * variance(&one), "{paths}: {} {}", variance(&one), variance(&eight));
+        }
+    }
 }

@@ -1,10 +1,10 @@
 //! What a pilot chooses: joins that find nothing go, what only one join finds keeps it, and the choice
 //! changes no expectation.
 
-use crate::support::{BLOCK, scene, seed};
+use crate::support::{pictures, scene, seed};
 use crate::{chains, scenes};
-use nephroid::render::{Budget, Control, Estimator, Options, Render};
-use nephroid::report::agreement::{BlockSeries, agreement};
+use nephroid::render::{Estimator, Options, Render};
+use nephroid::report::agreement::agreement;
 use nephroid::scene::Scene;
 use nephroid::transport::settings::{FAINT, Plan, Settings, Techniques};
 
@@ -72,24 +72,15 @@ fn fainter_branches_are_followed_where_a_lamp_is_bright() {
     let world = scene(chains::GLOBE);
     let mut options = automatic(&world, seed());
     options.settings.faint = 1.0;
-    assert_eq!(Render::new(&world, &options).unwrap().plan().settings.faint, 1.0);
+    let plan = Render::new(&world, &options).unwrap().plan().clone();
+    assert_eq!((plan.settings.faint, plan.more_chains()), (1.0, 0));
 }
 
-/// Block means of independent renders.
-fn blocks(world: &Scene, renders: u64, options: impl Fn(u64) -> Options) -> BlockSeries {
-    let (columns, rows) = ((world.film.width / BLOCK) as usize, (world.film.height / BLOCK) as usize);
-    let draw = |r: u64| {
-        let mut render = Render::new(world, &options(r)).unwrap();
-        render.run(&Budget::passes(4), |_| Control::Continue);
-        let picture = render.picture();
-        let mut sums = vec![0.0; columns * rows];
-        for (i, p) in picture.mean.iter().enumerate() {
-            let (x, y) = (i as u32 % picture.width, i as u32 / picture.width);
-            sums[(y / BLOCK) as usize * columns + (x / BLOCK) as usize] += f64::from(p[0] + p[1] + p[2]);
-        }
-        sums
-    };
-    BlockSeries { columns, rows, draws: (0..renders).map(draw).collect(), ..BlockSeries::default() }
+#[test]
+fn chains_have_more_samples_where_images_of_a_lamp_are_small() {
+    assert!(chosen(chains::GLOBE).more_chains() > 0);
+    let away = room(BULB).replace(r#"target="0, 0.6, 0""#, r#"target="0, 0.6, 2""#);
+    assert_eq!(chosen(&away).more_chains(), 0);
 }
 
 /// Each render has its own pilot, choice and guide; merges, which are biased, are not among the joins.
@@ -99,12 +90,12 @@ fn whatever_is_chosen_the_mean_is_that_of_all_joins() {
     for (i, name) in ["diffuse box", "glass and mirror", "sun disk"].into_iter().enumerate() {
         let world = scene(&scenes::named(dir.path(), name));
         let first = seed() * 100_000 + 1000 * i as u64;
-        let chosen = blocks(&world, 40, |r| {
+        let chosen = pictures(&world, 40, |r| {
             let mut options = automatic(&world, first + r);
             options.settings.techniques = Techniques::BIDIRECTIONAL;
             options
         });
-        let all = blocks(&world, 40, |r| {
+        let all = pictures(&world, 40, |r| {
             let mut options = automatic(&world, first + 500 + r);
             options.settings = Settings {
                 techniques: Techniques::BIDIRECTIONAL,

@@ -3,7 +3,7 @@
 use glam::Vec2;
 use nephroid::math::Random;
 use nephroid::math::random::Family;
-use nephroid::render::{Options, Render};
+use nephroid::render::{Budget, Control, Options, Render};
 use nephroid::report::agreement::BlockSeries;
 use nephroid::scene::Scene;
 use nephroid::scene::emitter::Guide;
@@ -134,4 +134,21 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
             heavy: false,
         })
         .collect()
+}
+
+/// Block sums of whole renders of four passes, each with options of its own.
+pub fn pictures(world: &Scene, renders: u64, options: impl Fn(u64) -> Options) -> BlockSeries {
+    let (columns, rows) = ((world.film.width / BLOCK) as usize, (world.film.height / BLOCK) as usize);
+    let draw = |r: u64| {
+        let mut render = Render::new(world, &options(r)).unwrap();
+        render.run(&Budget::passes(4), |_| Control::Continue);
+        let picture = render.picture();
+        let mut sums = vec![0.0; columns * rows];
+        for (i, p) in picture.mean.iter().enumerate() {
+            let (x, y) = (i as u32 % picture.width, i as u32 / picture.width);
+            sums[(y / BLOCK) as usize * columns + (x / BLOCK) as usize] += f64::from(p[0] + p[1] + p[2]);
+        }
+        sums
+    };
+    BlockSeries { columns, rows, draws: (0..renders).map(draw).collect(), ..BlockSeries::default() }
 }

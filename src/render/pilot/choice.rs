@@ -16,7 +16,8 @@
 //! Costs are counts of operations times fixed weights ([`Costs`]), so that the choice is a
 //! function of scene, settings and seed alone.
 
-use super::branching::{BranchRays, Branching, LEAST};
+use super::branching::{BranchRays, LEAST};
+use super::chains::{ChainNoise, SAMPLES};
 use super::{Cell, Decisions, JOB, Pilot};
 use crate::math::Random;
 use crate::math::random::Family;
@@ -60,6 +61,8 @@ struct Costs {
     splat: f64,
     keep: f64,
     branch: f64,
+    /// A ray from the eye that only chains ask for.
+    look: f64,
 }
 const COSTS: Costs = Costs {
     gather_walk: 1.7,
@@ -72,6 +75,7 @@ const COSTS: Costs = Costs {
     splat: 0.8,
     keep: 0.4,
     branch: 1.2,
+    look: 0.7,
 };
 
 /// Operations per walk.
@@ -325,6 +329,10 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
                 let mut chains = watch.chains.drain(..).peekable();
                 for (i, t) in watch.witness.seen.drain(..).enumerate() {
                     let chain = chains.next_if(|(at, _)| *at == i).map(|(_, share)| share);
+                    if chain.is_none() && plan.settings.faint < 1.0 && t.path.vertices.iter().all(|v| v.dirac.is_some()) {
+                        // What chains vary is measured apart.
+                        continue;
+                    }
                     let merge = t.key.0 == Technique::Merge;
                     merges += if merge { 1.0 / share } else { 0.0 };
                     let told = tell(cx, &t, cell, if merge { 1.0 } else { 1.0 / share });
@@ -343,18 +351,30 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
     let mut evidence = eye.evidence;
     evidence.extend(shot.evidence);
     clip(&mut evidence);
-    let chains = evidence.iter().filter_map(|e| e.chain.map(|share| (e.square, share)));
-    let branchings = eye.branches.judged(pilot.settings.faint, chains, walks);
+    let followed = evidence.iter().filter_map(|e| e.chain.map(|share| (e.square, share)));
+    let branchings = eye.branches.judged(pilot.settings.faint, followed, walks);
+    let chains = ChainNoise::measured(pilot, &plan, &dark_squares);
+    let ways: Vec<_> = branchings.iter().flat_map(|b| SAMPLES.map(|samples| (b, samples))).collect();
+    let ways = if chains.is_some() { ways } else { vec![(&branchings[0], pilot.settings.chain_samples)] };
+    let chains = chains.unwrap_or_default();
     let candidates = Candidate::all(pilot.settings, pixels);
     let judged = candidates.iter().flat_map(|c| {
         let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };
         let lacks = if c.next_event && c.connect { 1.0 } else { LESS_MUST_WIN };
         let (noise, cost) = (c.noise(&evidence), c.cost(&eye_counts, &light_counts, merges));
-        let judge = move |b: &Branching| ((noise + b.noise) * (cost + COSTS.branch * b.rays) * blurs * lacks, c, b.faint);
-        branchings.iter().map(judge)
+        ways.iter().map(move |(b, samples)| {
+            let noise = noise + chains.noise(b, *samples);
+            let cost = cost + COSTS.branch * b.rays + chains.cost(*samples, COSTS.look, COSTS.branch);
+            (noise * cost * blurs * lacks, c, (b.faint, *samples))
+        })
     });
     let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map_or_else(|| pilot.settings.clone(), |(_, c, faint)| Settings { faint, ..c.settings(pilot.settings, pixels) })
+    let with = |(_, c, (faint, chain_samples)): (f64, &Candidate, _)| Settings {
+        faint,
+        chain_samples,
+        ..c.settings(pilot.settings, pixels)
+    };
+    best.map_or_else(|| pilot.settings.clone(), with)
 }
 
 /// Limits what a single path can say; chains are all found, none by luck.

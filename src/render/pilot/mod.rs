@@ -10,6 +10,7 @@
 //! scene, settings and seed alone, the same for all shards of a render.
 
 mod branching;
+mod chains;
 mod choice;
 
 use crate::math::Random;
@@ -121,6 +122,7 @@ impl Decisions {
         bytes.extend(self.vertices_per_path.to_bits().to_le_bytes());
         bytes.extend(self.merge_radius.to_bits().to_le_bytes());
         bytes.extend(self.settings.faint.to_bits().to_le_bytes());
+        bytes.extend(self.settings.chain_samples.to_le_bytes());
         bytes
     }
 }
