@@ -18,7 +18,7 @@ use nephroid::render::Options;
 use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
-use nephroid::transport::settings::{FAINT, Settings, Techniques};
+use nephroid::transport::settings::{FAINT, NO_BRANCHES, Settings, Techniques};
 use support::{Effort, pictures, scene, seed, series};
 
 /// A mistake is planted for the whole process.
@@ -155,7 +155,8 @@ fn planted_mistakes_double_chains() {
     let chains = |branching, seed| {
         let techniques = Techniques::parse("hit").unwrap();
         let paths = PathFilter::parse("E S+ L").unwrap();
-        let settings = Settings { techniques, paths, faint: if branching { FAINT } else { 1.0 }, seed, ..Settings::default() };
+        let settings =
+            Settings { techniques, paths, faint: if branching { FAINT } else { NO_BRANCHES }, seed, ..Settings::default() };
         series(&world, &settings, Effort { renders: 64, passes: 10, max_length: 5 })
     };
     let by_chance = chains(false, seed() * 77 + 1);

@@ -15,7 +15,7 @@ use crate::report::memory;
 use crate::scene::Scene;
 use crate::transport::class::PathFilter;
 use crate::transport::mis::Heuristic;
-use crate::transport::settings::{Coupling, FAINT, Plan, Techniques};
+use crate::transport::settings::{Coupling, FAINT, NO_BRANCHES, Plan, Techniques};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::Write;
@@ -154,7 +154,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     s.light_paths = t.light_paths;
     s.connections = t.connections;
     s.guided = !t.no_guide;
-    s.faint = if t.no_branching { 1.0 } else { FAINT };
+    s.faint = if t.no_branching { NO_BRANCHES } else { FAINT };
     s.stratified = t.sampler == SamplerName::Stratified;
     s.seed = args.seed.unwrap_or(opened.scene.seed);
     (estimator, options)

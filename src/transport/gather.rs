@@ -71,7 +71,7 @@ pub fn follow<R: Record, O: Observe>(
         eta: 1.0,
         class: plan.settings.paths.eye(),
         first_delta: false,
-        chain: if plan.settings.faint < 1.0 { Chain::Single } else { Chain::Ended },
+        chain: if plan.settings.follows_chains() { Chain::Single } else { Chain::Ended },
     };
     loop {
         tally.rays.gather += 1;
@@ -110,7 +110,6 @@ pub fn follow<R: Record, O: Observe>(
             }
         }
         if walk.chain == Chain::Single
-            && plan.settings.techniques.hit
             && vertex.closure.roughness() == 0.0
             && chain::follow(cx, &walk, &vertex, weight, random, tally)
         {

@@ -97,6 +97,8 @@ pub enum Coupling {
 
 /// Default of [`Settings::faint`].
 pub const FAINT: f32 = 1e-2;
+/// The value with which no branches are followed.
+pub const NO_BRANCHES: f32 = 1.0;
 
 /// Everything that decides what is estimated and by which joins.
 #[derive(Clone, Debug)]
@@ -126,7 +128,7 @@ pub struct Settings {
     /// Light paths start where a pilot found that they matter.
     pub guided: bool,
     /// Branches of a chain of Dirac events from the eye to a light ([`super::chain`]) that carry less than this
-    /// share of the pixel are followed with a probability only; 1: a walk takes one way at random.
+    /// share of the pixel are followed with a probability only; [`NO_BRANCHES`]: a walk takes one way at random.
     pub faint: f32,
     /// Samples of chains of Dirac events between eye and light (E S* L) per pixel and pass, where branches are followed:
     /// nothing but a hit finds them, so a reflection of a lamp that is smaller than a pixel needs many.
@@ -140,6 +142,11 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// All branches of chains are followed, not one at random.
+    pub fn follows_chains(&self) -> bool {
+        self.faint < NO_BRANCHES && self.techniques.hit && self.coupling == Coupling::All
+    }
+
     /// Longest path in edges that is walked.
     pub fn longest(&self) -> u32 {
         self.max_length.min(match self.coupling {
@@ -242,7 +249,7 @@ impl Plan {
     /// Samples of chains alone beside each gathering walk.
     pub fn more_chains(&self) -> u32 {
         let s = &self.settings;
-        if s.faint < 1.0 && s.techniques.hit && s.coupling == Coupling::All { s.chain_samples.saturating_sub(1) } else { 0 }
+        if s.follows_chains() { s.chain_samples.saturating_sub(1) } else { 0 }
     }
 
     /// Shooting walks leave vertices for gathering walks.

@@ -6,7 +6,7 @@ use nephroid::render::{Budget, Control, Options, Render};
 use nephroid::report::agreement::{BlockSeries, agreement};
 use nephroid::scene::Scene;
 use nephroid::transport::class::PathFilter;
-use nephroid::transport::settings::{FAINT, Settings, Techniques};
+use nephroid::transport::settings::{FAINT, NO_BRANCHES, Settings, Techniques};
 
 /// A lamp of radiance 1 behind a plate of index 4.
 const PLATE: &str = r#"<scene version="3.0.0">
@@ -33,7 +33,7 @@ pub const GLOBE: &str = r#"<scene version="3.0.0">
 fn settings(techniques: &str, branching: bool, add: u64) -> Settings {
     Settings {
         techniques: Techniques::parse(techniques).unwrap(),
-        faint: if branching { FAINT } else { 1.0 },
+        faint: if branching { FAINT } else { NO_BRANCHES },
         rr_depth: 4,
         seed: seed() * 1000 + 800 + add,
         ..Settings::default()

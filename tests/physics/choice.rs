@@ -6,7 +6,7 @@ use crate::{chains, scenes};
 use nephroid::render::{Estimator, Options, Render};
 use nephroid::report::agreement::agreement;
 use nephroid::scene::Scene;
-use nephroid::transport::settings::{FAINT, Plan, Settings, Techniques};
+use nephroid::transport::settings::{FAINT, NO_BRANCHES, Plan, Settings, Techniques};
 
 fn automatic(world: &Scene, seed: u64) -> Options {
     let mut options = Options::for_scene(world, Estimator::Auto);
@@ -71,9 +71,9 @@ fn fainter_branches_are_followed_where_a_lamp_is_bright() {
     assert_eq!(chosen(&room(BULB)).settings.faint, FAINT);
     let world = scene(chains::GLOBE);
     let mut options = automatic(&world, seed());
-    options.settings.faint = 1.0;
+    options.settings.faint = NO_BRANCHES;
     let plan = Render::new(&world, &options).unwrap().plan().clone();
-    assert_eq!((plan.settings.faint, plan.more_chains()), (1.0, 0));
+    assert_eq!((plan.settings.faint, plan.more_chains()), (NO_BRANCHES, 0));
 }
 
 #[test]

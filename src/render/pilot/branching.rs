@@ -8,12 +8,12 @@
 //! [`transport::chain`]: crate::transport::chain
 //! [`Settings::faint`]: crate::transport::settings::Settings::faint
 
-use crate::transport::settings::FAINT;
+use crate::transport::settings::{FAINT, NO_BRANCHES};
 
 /// The faintest branches that the pilot follows for sure.
 pub(super) const LEAST: f32 = 1e-4;
 /// What is considered, the default first; the last stands for no branches.
-const FAINTEST: [f32; 5] = [FAINT, 1e-1, 1e-3, LEAST, 1.0];
+const FAINTEST: [f32; 5] = [FAINT, 1e-1, 1e-3, LEAST, NO_BRANCHES];
 
 /// What comes of a value of [`Settings::faint`](crate::transport::settings::Settings::faint).
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +50,7 @@ impl BranchRays {
     /// Every choice, from the squares of what chains found (relative to the picture) and their shares, and the number
     /// of walks; only the one that is given where that says no branches.
     pub(super) fn judged(&self, given: f32, chains: impl Iterator<Item = (f64, f32)> + Clone, walks: u32) -> Vec<Branching> {
-        if given >= 1.0 {
+        if given >= NO_BRANCHES {
             return vec![Branching { faint: given, noise: 0.0, rays: 0.0 }];
         }
         let excess = |faint: f32, share: f32| f64::from(faint / share).max(1.0);

@@ -5,7 +5,7 @@ use super::{JOB, Pilot};
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::transport::chain;
-use crate::transport::settings::{Coupling, Plan};
+use crate::transport::settings::Plan;
 use crate::transport::walk::{Context, Tally};
 use crate::transport::{Contribution, RayCounts, Record};
 use glam::Vec2;
@@ -37,11 +37,11 @@ impl Record for Sum {
 }
 
 impl ChainNoise {
-    /// Looks at evenly spread pixels; `None` where `plan` does not follow chains.
-    pub(super) fn measured(pilot: &Pilot<'_>, plan: &Plan, dark_squares: &[f64]) -> Option<Self> {
+    /// Looks at evenly spread pixels; nothing where `plan` does not follow chains.
+    pub(super) fn measured(pilot: &Pilot<'_>, plan: &Plan, dark_squares: &[f64]) -> Self {
         let s = &plan.settings;
-        if s.faint >= 1.0 || !s.techniques.hit || s.coupling != Coupling::All {
-            return None;
+        if !s.follows_chains() {
+            return Self::default();
         }
         let cx = Context::new(pilot.scene, plan, 0);
         let all = pilot.crop[2].saturating_mul(pilot.crop[3]);
@@ -72,10 +72,10 @@ impl ChainNoise {
         // In the order of the jobs, so that sums do not depend on threads.
         let found = jobs.collect::<Vec<_>>().into_iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         let samples = f64::from(looked) * f64::from(LOOKS);
-        Some(Self {
+        Self {
             noise: found.0 * f64::from(all) / f64::from(looked.max(1)),
             branches: (found.1 as f64 / samples.max(1.0) - 1.0).max(0.0),
-        })
+        }
     }
 
     /// Noise of a pass with so many samples, with what `branching` leaves to chance.

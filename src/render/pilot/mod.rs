@@ -12,6 +12,7 @@
 mod branching;
 mod chains;
 mod choice;
+mod evidence;
 
 use crate::math::Random;
 use crate::math::random::Family;
@@ -20,7 +21,7 @@ use crate::scene::emitter::Emission;
 use crate::scene::emitter::guide::{Guide, Start};
 use crate::transport::cache::LightCache;
 use crate::transport::gather::{follow, gather};
-use crate::transport::settings::{Plan, Settings, Techniques};
+use crate::transport::settings::{NO_BRANCHES, Plan, Settings, Techniques};
 use crate::transport::shoot::shoot;
 use crate::transport::walk::{Context, Join, Observe, Tally};
 use crate::transport::{Contribution, RayCounts, Record, Technique};
@@ -247,7 +248,7 @@ impl<'a> Pilot<'a> {
     /// can be merged, so that merging blurs less than the film does.
     fn merge_radius(&self) -> f32 {
         let techniques = Techniques { next_event: false, ..Techniques::GATHER };
-        let settings = Settings { techniques, faint: 1.0, ..self.settings.clone() };
+        let settings = Settings { techniques, faint: NO_BRANCHES, ..self.settings.clone() };
         let plan = Plan::new(&settings, 1, 1, 0.0);
         let jobs = (0..SCOUTS / JOB).into_par_iter().map(|job| {
             let mut footprints = Footprints { parallel: self.scene.sensor.is_orthographic(), ..Footprints::default() };

@@ -1,0 +1,308 @@
+//! What a pilot's walks find and count, for the choice of techniques ([`super::choice`]).
+
+use super::branching::{BranchRays, Branching};
+use super::{Cell, JOB, Pilot};
+use crate::math::Random;
+use crate::math::random::Family;
+use crate::scene::Surface;
+use crate::transport::cache::{LightCache, LightVertex};
+use crate::transport::gather::gather;
+use crate::transport::reference::{Subpath, Testimony, Witness};
+use crate::transport::settings::Plan;
+use crate::transport::shoot::shoot;
+use crate::transport::vertex::Scatter;
+use crate::transport::walk::{Context, Join, Observe, Tally};
+use crate::transport::{Contribution, RayCounts, Record, Technique};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A single path counts for at most this part of all: one that luck found must not decide.
+const MOST: f64 = 5e-3;
+/// Steps towards the bound of what a path can say.
+const CLIPPINGS: u32 = 16;
+
+/// Operations per walk.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Counts {
+    walks: f64,
+    /// Rays.
+    pub(super) steps: f64,
+    /// Vertices at which walks can be joined.
+    pub(super) ends: f64,
+}
+
+/// What one path found by the mixture tells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Evidence {
+    /// C² relative to the square of the picture, as a whole pass would find it.
+    pub(super) square: f64,
+    /// r_τ by the number of the join.
+    pub(super) shares: [f64; Technique::ALL.len()],
+    /// Without noise where next events are on: a delta light seen at the first vertex.
+    pub(super) steady: bool,
+    /// Share of the pixel that its chain carries, where it is one of [`crate::transport::chain`].
+    pub(super) chain: Option<f32>,
+}
+
+/// Values of splats by pixel position, in the order in which they are witnessed.
+struct Splats(Vec<Vec2>);
+impl Record for Splats {
+    fn gathered(&mut self, _: Contribution) {}
+    fn splatted(&mut self, raster: Vec2, _: &mut Random, c: Contribution) {
+        if c.length > 1 {
+            self.0.push(raster);
+        }
+    }
+}
+
+/// A witness that also counts operations.
+struct Watch {
+    witness: Witness,
+    counts: Counts,
+    branches: BranchRays,
+    /// Share of the branch that is followed.
+    share: Option<f32>,
+    /// Shares of what was seen on branches, by its place among all that was seen.
+    chains: Vec<(usize, f32)>,
+    /// The vertex last reached has not scattered.
+    pending: bool,
+}
+impl Observe for Watch {
+    fn started(&mut self, from: Vec3, light: Option<&crate::scene::emitter::Emission>) {
+        self.counts.walks += 1.0;
+        self.pending = false;
+        self.share = None;
+        self.witness.started(from, light);
+    }
+    fn arrived(&mut self, surface: &Surface) {
+        self.counts.ends += 1.0;
+        self.pending = true;
+        self.witness.arrived(surface);
+    }
+    fn cached(&mut self, vertex: &LightVertex) {
+        self.witness.cached(vertex);
+    }
+    fn scattered(&mut self, s: &Scatter) {
+        self.counts.ends -= if s.delta { 1.0 } else { 0.0 };
+        self.pending = false;
+        self.witness.scattered(s);
+    }
+    fn returned(&mut self, vertices: usize) {
+        // Nothing is joined at the end of a branch.
+        self.counts.ends -= if self.pending { 1.0 } else { 0.0 };
+        self.pending = false;
+        self.share = None;
+        self.witness.returned(vertices);
+    }
+    fn followed(&mut self, share: f32) {
+        self.branches.count(share);
+        self.share = Some(share);
+    }
+    fn joined(&mut self, join: Join<'_>) {
+        let before = self.witness.seen.len();
+        self.witness.joined(join);
+        if let (Some(share), true) = (self.share, self.witness.seen.len() > before) {
+            self.chains.push((before, share));
+        }
+    }
+}
+
+impl Watch {
+    fn new(witness: Witness) -> Self {
+        Self { witness, counts: Counts::default(), branches: BranchRays::default(), share: None, chains: vec![], pending: false }
+    }
+}
+
+/// What a job found.
+#[derive(Default)]
+struct Found {
+    evidence: Vec<Evidence>,
+    counts: Counts,
+    branches: BranchRays,
+    merges: f64,
+}
+
+impl Found {
+    fn join(mut self, other: Self) -> Self {
+        self.evidence.extend(other.evidence);
+        self.counts.walks += other.counts.walks;
+        self.counts.steps += other.counts.steps;
+        self.counts.ends += other.counts.ends;
+        self.merges += other.merges;
+        self.branches.join(other.branches);
+        self
+    }
+
+    fn per_walk(&self) -> Counts {
+        let Counts { walks, steps, ends } = self.counts;
+        Counts { walks, steps: steps / walks.max(1.0), ends: ends / walks.max(1.0) }
+    }
+}
+
+/// All that a pilot knows to judge by.
+pub(super) struct Findings {
+    /// Paths, none of which says too much.
+    pub(super) evidence: Vec<Evidence>,
+    /// Per gathering walk.
+    pub(super) eye: Counts,
+    /// Per light path.
+    pub(super) light: Counts,
+    /// Merges per gathering walk, with one light path per pixel.
+    pub(super) merges: f64,
+    branches: BranchRays,
+    walks: u32,
+}
+
+impl Findings {
+    /// From `paths` light paths and as large a part of the pixels, all joins of `plan` on.
+    pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, paths: u32) -> Self {
+        let share = f64::from(paths) / f64::from(plan.light_paths.max(1));
+        let squares = pilot.squares();
+        let (shot, pieces, subpaths) = shot(pilot, &plan, &squares, paths, share);
+        let cache = LightCache::new(pieces, plan.merge_radius);
+        let pixels = pilot.crop[2].saturating_mul(pilot.crop[3]);
+        let walks = (f64::from(pixels) * share).ceil() as u32;
+        plan.inv_light_paths = 1.0 / paths as f32;
+        let eye = gathered(pilot, &plan, &squares, (walks, share), &cache, &Arc::new(subpaths));
+        let (light, merges) = (shot.per_walk(), eye.merges / f64::from(walks.max(1)));
+        let mut found = Self { eye: eye.per_walk(), light, merges, branches: eye.branches, evidence: eye.evidence, walks };
+        found.evidence.extend(shot.evidence);
+        clip(&mut found.evidence);
+        found
+    }
+
+    /// What comes of following branches down to this or that share.
+    pub(super) fn branchings(&self, given: f32) -> Vec<Branching> {
+        let followed = self.evidence.iter().filter_map(|e| e.chain.map(|share| (e.square, share)));
+        self.branches.judged(given, followed, self.walks)
+    }
+}
+
+/// What light paths find; their vertices, and the subpaths that led to these.
+fn shot(pilot: &Pilot<'_>, plan: &Plan, squares: &[f64], paths: u32, share: f64) -> (Found, Vec<Vec<LightVertex>>, Vec<Subpath>) {
+    let shots: Vec<_> = (0..paths.div_ceil(JOB))
+        .into_par_iter()
+        .map(|job| {
+            let cx = Context::new(pilot.scene, plan, 0);
+            let mut watch = Watch::new(Witness::default());
+            watch.witness.expect_shooting(true);
+            let (mut vertices, mut splats, mut rays) = (vec![], Splats(vec![]), RayCounts::default());
+            for index in job * JOB..((job + 1) * JOB).min(paths) {
+                let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 34, 0, plan.settings.seed);
+                let mut tally = Tally { record: &mut splats, rays: &mut rays, observe: &mut watch };
+                shoot(cx, Some(&mut vertices), &mut random, &mut tally);
+            }
+            watch.counts.steps = rays.shoot as f64;
+            let seen = watch.witness.seen.iter().zip(&splats.0);
+            let tell = |t, cell: Cell| evidence(cx, t, squares[cell as usize], 1.0 / share);
+            let evidence = seen.filter_map(|(t, raster)| tell(t, pilot.cell(*raster)?)).collect();
+            let found = Found { evidence, counts: watch.counts, ..Found::default() };
+            (found, vertices, watch.witness.into_subpaths())
+        })
+        .collect();
+    let (mut all, mut pieces, mut subpaths) = (Found::default(), vec![], vec![]);
+    for (found, vertices, paths) in shots {
+        all = all.join(found);
+        pieces.push(vertices);
+        subpaths.extend(paths);
+    }
+    (all, pieces, subpaths)
+}
+
+/// What `walks` gathering walks find, a `share` of a pass.
+fn gathered(
+    pilot: &Pilot<'_>,
+    plan: &Plan,
+    squares: &[f64],
+    (walks, share): (u32, f64),
+    cache: &LightCache,
+    subpaths: &Arc<Vec<Subpath>>,
+) -> Found {
+    let dark_squares = pilot.dark_squares();
+    let follows = plan.settings.follows_chains();
+    let found: Vec<Found> = (0..walks.div_ceil(JOB))
+        .into_par_iter()
+        .map(|job| {
+            let cx = Context::new(pilot.scene, plan, 0);
+            let mut watch = Watch::new(Witness::with_subpaths(subpaths.clone()));
+            let mut rays = RayCounts::default();
+            let (mut found, mut merges) = (vec![], 0.0);
+            for index in job * JOB..((job + 1) * JOB).min(walks) {
+                let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 35, 0, plan.settings.seed);
+                let raster = pilot.raster(index, walks, &mut random);
+                let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut watch };
+                gather(cx, raster, 1.0, cache, &mut random, &mut tally);
+                let Some(cell) = pilot.cell(raster) else { continue };
+                let mut chains = watch.chains.drain(..).peekable();
+                for (i, t) in watch.witness.seen.drain(..).enumerate() {
+                    let chain = chains.next_if(|(at, _)| *at == i).map(|(_, share)| share);
+                    if chain.is_none() && follows && t.path.vertices.iter().all(|v| v.dirac.is_some()) {
+                        // What chains vary is measured apart.
+                        continue;
+                    }
+                    let merge = t.key.0 == Technique::Merge;
+                    merges += if merge { 1.0 / share } else { 0.0 };
+                    let told = evidence(cx, &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
+                    // A lamp's image shines on its cell alone, its reflections on dark ones around it.
+                    let darker = if chain.is_some() { squares[cell as usize] / dark_squares[cell as usize] } else { 1.0 };
+                    found.extend(told.map(|e| Evidence { chain, square: e.square * darker, ..e }));
+                }
+            }
+            watch.counts.steps = rays.gather as f64 - watch.branches.all;
+            Found { evidence: found, counts: watch.counts, branches: watch.branches, merges }
+        })
+        .collect();
+    found.into_iter().fold(Found::default(), Found::join)
+}
+
+/// Limits what a single path can say; chains are all found, none by luck.
+fn clip(evidence: &mut [Evidence]) {
+    let by_luck = |e: &&Evidence| e.chain.is_none();
+    // Of few, each may be twice their mean.
+    let part = MOST.max(2.0 / evidence.iter().filter(by_luck).count().max(1) as f64);
+    let mut most = f64::INFINITY;
+    // Falls to the value that is the wanted part of the sum it leaves.
+    for _ in 0..CLIPPINGS {
+        most = part * evidence.iter().filter(by_luck).map(|e| e.square.min(most)).sum::<f64>();
+    }
+    evidence.iter_mut().filter(|e| e.chain.is_none()).for_each(|e| e.square = e.square.min(most));
+}
+
+fn evidence(cx: Context<'_>, t: &Testimony, square: f64, often: f64) -> Option<Evidence> {
+    let value = f64::from(t.value.mean());
+    if !(value > 0.0 && value.is_finite() && square > 0.0) {
+        return None;
+    }
+    let mut shares = [0.0; Technique::ALL.len()];
+    for ((technique, _), weight) in t.path.weights(cx) {
+        shares[technique as usize] += weight;
+    }
+    let steady = t.path.light_delta && t.path.vertices.len() == 1;
+    shares.iter().sum::<f64>().is_finite().then_some(Evidence {
+        square: often * value * value / square,
+        shares,
+        steady,
+        chain: None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn luck_does_not_decide() {
+        let of = |square| Evidence { square, shares: [1.0, 0.0, 0.0, 0.0, 0.0], steady: false, chain: None };
+        let mut evidence: Vec<Evidence> = (0..1000).map(|_| of(1.0)).collect();
+        clip(&mut evidence);
+        assert!(evidence.iter().all(|e| e.square == 1.0));
+        evidence.push(of(1e12));
+        clip(&mut evidence);
+        // A two-hundredth of all, itself included.
+        assert!((evidence[1000].square - 5.0).abs() < 0.1, "{}", evidence[1000].square);
+        let mut few = vec![of(1.0), of(1e12), of(1.0)];
+        clip(&mut few);
+        assert!(few[1].square < 1e10 && few[0].square == 1.0, "{}", few[1].square);
+    }
+}
