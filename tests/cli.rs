@@ -523,6 +523,7 @@ fn a_plan_is_written_once_and_read_from_then_on() {
             r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": 0, "faint_branches": 2}"#,
             "faint_branches",
         ),
+        (r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": 0, "chain_samples": 0}"#, "chain_samples"),
         (r#"{"techniques": "hit", "light_paths": 0}"#, "missing field"),
         (r#"{"techniques": "splat", "light_paths": 4294967295, "connections": 1, "merge_radius": 0}"#, "--max-memory"),
         ("", "EOF"),
