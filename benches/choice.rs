@@ -1,15 +1,17 @@
 //! What `auto` chooses against the best fixed set of joins, found by trying all of them at equal time.
 //!
-//! `cargo bench --bench choice -- [--time SECONDS] SCENE.xml ...`, each with the reference that `nephroid bench` keeps
-//! beside it. Every set of joins with every number of light paths is rendered for the time (pilot included), the better
-//! third again with a second and a third seed, then the best three beside `auto`, interleaved, with ten fresh seeds.
-//! Errors are trimmed relMSE, the noise of the reference subtracted; ratios are of geometric means.
+//! `cargo bench --bench choice -- [--time SECONDS] SCENE.xml ...`. Every set of joins with every number of light paths is
+//! rendered for the time (pilot included), the better third again with a second and a third seed, then the best three
+//! beside `auto`, interleaved, with ten fresh seeds. Errors are trimmed relMSE against the reference that `nephroid bench`
+//! makes and keeps beside the scene, its noise subtracted; ratios are of geometric means.
 
-use nephroid::bench::{Subject, reference};
-use nephroid::io::write::read_image;
+use nephroid::bench::Subject;
+use nephroid::bench::effort::{Effort, Marks};
+use nephroid::bench::reference::reference;
+use nephroid::bench::statistics::{Interval, geometric_mean, ratio};
 use nephroid::render::{Budget, Control, Estimator, Options, Render};
 use nephroid::report::Picture;
-use nephroid::report::measures::distances_and_noise;
+use nephroid::report::measures::{distances_and_noise, own};
 use nephroid::scene::Scene;
 use nephroid::transport::settings::Techniques;
 use std::path::Path;
@@ -21,8 +23,8 @@ const LIGHT_PATHS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 const SECOND: usize = 14;
 const LAST: usize = 3;
 const FRESH: u64 = 10;
-/// Of Student's distribution with nine degrees of freedom, one-sided 97.5 %.
-const T: f64 = 2.262;
+/// A reference may take as long as so many runs.
+const REFERENCE_RUNS: u32 = 12;
 
 /// A fixed set of joins.
 #[derive(Clone, Copy, PartialEq)]
@@ -68,64 +70,59 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    fn error(&self, mut options: Options, seed: u64) -> f64 {
+    /// `None` where the reference is too noisy to tell.
+    fn error(&self, mut options: Options, seed: u64) -> Option<f64> {
         options.settings.seed = seed;
         let began = Instant::now();
         let mut render = Render::new(self.scene, &options).expect("a scene that loads");
         render.run(&Budget::time(self.time.saturating_sub(began.elapsed())), |_| Control::Continue);
         let (d, noise) = distances_and_noise(&render.picture().mean, &self.reference.mean, self.reference.variance.as_deref());
-        (d.relmse_trimmed - noise.relmse_trimmed).max(1e-9)
+        own(d.relmse_trimmed, noise.relmse_trimmed)
     }
 
     /// The sets with the lowest errors over seeds, the best first.
-    fn best(&self) -> Vec<Fixed> {
+    fn best(&self) -> Option<Vec<Fixed>> {
         let mut sums: Vec<(f64, Fixed)> = Fixed::all().into_iter().map(|f| (0.0, f)).collect();
         for (seed, kept) in [(1, SECOND), (2, SECOND), (3, LAST)] {
             for (sum, fixed) in &mut sums {
-                *sum += self.error(fixed.options(self.scene), seed).ln();
+                *sum += self.error(fixed.options(self.scene), seed)?.ln();
             }
             sums.sort_by(|a, b| a.0.total_cmp(&b.0));
             sums.truncate(kept);
         }
-        sums.into_iter().map(|(_, f)| f).collect()
+        Some(sums.into_iter().map(|(_, f)| f).collect())
     }
 
-    /// Logarithms of error ratios of `auto` to each of `fixed`, for fresh seeds.
-    fn ratios(&self, fixed: &[Fixed]) -> Vec<Vec<f64>> {
-        let mut ratios = vec![vec![]; fixed.len()];
+    /// Error of `auto` over that of each of `fixed`, with fresh seeds.
+    fn ratios(&self, fixed: &[Fixed]) -> Option<Vec<Interval>> {
+        let (mut auto, mut others) = (vec![], vec![vec![]; fixed.len()]);
         for seed in 1001..1001 + FRESH {
-            let auto = self.error(Options::for_scene(self.scene, Estimator::Auto), seed);
-            for (ratios, f) in ratios.iter_mut().zip(fixed) {
-                ratios.push((auto / self.error(f.options(self.scene), seed)).ln());
+            auto.push(self.error(Options::for_scene(self.scene, Estimator::Auto), seed)?);
+            for (errors, f) in others.iter_mut().zip(fixed) {
+                errors.push(self.error(f.options(self.scene), seed)?);
             }
         }
-        ratios
+        others.iter().map(|errors| ratio(&auto, errors)).collect()
     }
-}
-
-/// Mean, and the half width of its 95 % interval.
-fn interval(logarithms: &[f64]) -> (f64, f64) {
-    let n = logarithms.len() as f64;
-    let mean = logarithms.iter().sum::<f64>() / n;
-    let variance = logarithms.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, T * (variance / n).sqrt())
 }
 
 fn trial(path: &Path, time: Duration) -> Result<f64, String> {
     let scene = nephroid::load(path, &Default::default()).map_err(|e| e.to_string())?.scene;
-    let kept = reference::place(&Subject { name: String::new(), path, scene: &scene });
-    let file =
-        read_image(&kept).map_err(|e| format!("{e}\nmake a reference first: nephroid bench {} -o report", path.display()))?;
-    let reference = Picture::of_file(&file).ok_or_else(|| format!("{}: not a picture", kept.display()))?;
-    let trial = Trial { scene: &scene, reference, time };
-    println!("{}, {time:?}", path.display());
-    let best = trial.best();
-    let ratios: Vec<(f64, f64)> = trial.ratios(&best).iter().map(|r| interval(r)).collect();
-    for (fixed, (mean, half)) in best.iter().zip(&ratios) {
-        println!("  auto / {}: {:.2} ({:.2} to {:.2})", fixed.name(), mean.exp(), (mean - half).exp(), (mean + half).exp());
+    let subject = Subject { name: String::new(), path, scene: &scene };
+    let effort =
+        Effort { marks: Marks::Time(vec![time]), runs: 1, seed: 0, reference_error: 0.02, reference_time: REFERENCE_RUNS * time };
+    let found = reference(&subject, None, &effort, &|| false)?.ok_or("no reference")?;
+    println!("{}, {time:?}, reference {}", path.display(), found.origin);
+    let trial = Trial { scene: &scene, reference: found.picture, time };
+    let noisy = || format!("{}: the error is mostly that of the reference", path.display());
+    let best = trial.best().ok_or_else(noisy)?;
+    let ratios = trial.ratios(&best).ok_or_else(noisy)?;
+    for (fixed, r) in best.iter().zip(&ratios) {
+        let [low, high] = r.bounds.unwrap_or_default();
+        println!("  auto / {}: {:.2} ({low:.2} to {high:.2})", fixed.name(), r.value);
     }
     // Of the best, which fresh seeds decide.
-    Ok(ratios.iter().map(|r| r.0).fold(f64::NEG_INFINITY, f64::max))
+    Ok(ratios.iter().map(|r| r.value).fold(0.0, f64::max))
 }
 
 fn main() {
@@ -143,8 +140,7 @@ fn main() {
             Err(e) => eprintln!("{e}"),
         }
     }
-    if !ratios.is_empty() {
-        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-        println!("geometric mean of {} scenes: {:.2}", ratios.len(), mean.exp());
+    if let Some(mean) = geometric_mean(&ratios) {
+        println!("geometric mean of {} scenes: {:.2}", ratios.len(), mean.value);
     }
 }

@@ -14,7 +14,7 @@ use super::reference::Reference;
 use super::statistics::{Interval, geometric_mean, mean};
 use super::{Subject, size, verdict};
 use crate::report::coverage::{Blind, Coverage};
-use crate::report::measures::Noise;
+use crate::report::measures::{Noise, own};
 use crate::transport::RayCounts;
 use serde::Serialize;
 
@@ -167,11 +167,6 @@ pub struct Point {
 }
 
 impl Point {
-    /// An error without what the reference added; `None` where it is mostly that.
-    pub fn own(&self, error: f64, noise: f64) -> Option<f64> {
-        (error > 2.0 * noise).then_some(error - noise)
-    }
-
     /// Powers of the time between two points.
     fn towards(&self, o: &Self, share: f64) -> Self {
         let between = |a: f64, b: f64| if a > 0.0 && b > 0.0 { a * (b / a).powf(share) } else { b };
@@ -189,9 +184,9 @@ impl Point {
     /// The image's own error by a measure.
     pub fn error(&self, measure: Measure) -> Option<f64> {
         match measure {
-            Measure::Relmse => self.own(self.relmse, self.noise.relmse),
-            Measure::RelmseTrimmed => self.own(self.relmse_trimmed, self.noise.relmse_trimmed),
-            Measure::Rmse => self.own(self.rmse * self.rmse, self.noise.mse).map(f64::sqrt),
+            Measure::Relmse => own(self.relmse, self.noise.relmse),
+            Measure::RelmseTrimmed => own(self.relmse_trimmed, self.noise.relmse_trimmed),
+            Measure::Rmse => own(self.rmse * self.rmse, self.noise.mse).map(f64::sqrt),
             Measure::Flip => Some(self.flip),
             Measure::Cost => None,
         }

@@ -6,7 +6,7 @@ use super::figures::{ContenderFigures, Point, RunFigures};
 use super::reference::Reference;
 use super::statistics::{Images, slope};
 use crate::report::flip::{Range, flip};
-use crate::report::measures::{distances_and_noise, relative_variance};
+use crate::report::measures::{distances_and_noise, own, relative_variance};
 
 /// A contender with what it did.
 pub struct Entry {
@@ -97,7 +97,7 @@ impl Entry {
 /// What a run says.
 pub fn figures(seed: u64, run: &Run, reference: &Reference) -> RunFigures {
     let curve: Vec<Point> = run.snapshots.iter().map(|s| point(s.seconds, s.samples, &s.image, reference)).collect();
-    let errors: Vec<_> = curve.iter().map(|p| (p.samples as f64, p.own(p.relmse_trimmed, p.noise.relmse_trimmed))).collect();
+    let errors: Vec<_> = curve.iter().map(|p| (p.samples as f64, own(p.relmse_trimmed, p.noise.relmse_trimmed))).collect();
     let errors: Vec<_> = errors.into_iter().filter_map(|(n, e)| e.map(|e| (n, e))).collect();
     let variance = run.variance.as_ref().map(|v| relative_variance(v, &reference.picture.mean));
     RunFigures {

@@ -34,6 +34,11 @@ pub struct Noise {
     pub relmse_trimmed: f64,
 }
 
+/// An error without what the reference added; `None` where it is mostly that.
+pub fn own(error: f64, noise: f64) -> Option<f64> {
+    (error > 2.0 * noise).then_some(error - noise)
+}
+
 /// Distances of `image` from `reference`, over pixels that are finite in both; the slices are of
 /// equal length.
 pub fn distances(image: &[[f32; 3]], reference: &[[f32; 3]]) -> Distances {

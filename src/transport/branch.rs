@@ -12,6 +12,7 @@ use crate::local::Equation;
 use crate::math::Random;
 use crate::scene::Surface;
 use crate::scene::geometry::Ray;
+use crate::scene::sensor::SensorRay;
 use crate::spectrum::Spectrum;
 use arrayvec::ArrayVec;
 
@@ -39,6 +40,22 @@ pub struct Branch {
     pub last_delta: bool,
     /// Where the ray comes from, and the event there; `None` for the lens.
     pub event: Option<(Surface, Scatter)>,
+}
+
+impl Branch {
+    /// The ray of a sample of the sensor, `weight` the factor of its reconstruction filter.
+    pub fn from_lens(start: &SensorRay, weight: f32, filter: &PathFilter) -> Self {
+        Self {
+            ray: Ray { o: start.o, d: start.d, t_max: start.t_max },
+            throughput: Spectrum::ONE * weight,
+            eta: 1.0,
+            length: 0,
+            class: filter.eye(),
+            first_delta: false,
+            last_delta: false,
+            event: None,
+        }
+    }
 }
 
 /// Rays of one sample that wait to be followed, the last come first.

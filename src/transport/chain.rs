@@ -17,7 +17,6 @@ use crate::math::Random;
 use crate::scene::EmitterId;
 use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::Ray;
-use crate::spectrum::Spectrum;
 use glam::Vec2;
 
 /// After so many events, where mirrors could go on for ever, branches are followed with a probability only,
@@ -69,16 +68,7 @@ pub fn sample<R: Record, O: Observe>(
     let start = cx.scene.sensor.sample_ray(raster, random.axis2());
     tally.observe.started(start.lens, None);
     let mut open = Branches::new(u32::MAX);
-    open.start(Branch {
-        ray: Ray { o: start.o, d: start.d, t_max: start.t_max },
-        throughput: Spectrum::ONE * weight,
-        eta: 1.0,
-        length: 0,
-        class: cx.plan.settings.paths.eye(),
-        first_delta: false,
-        last_delta: false,
-        event: None,
-    });
+    open.start(Branch::from_lens(&start, weight, &cx.plan.settings.paths));
     explore(cx, &mut open, weight, random, tally);
 }
 

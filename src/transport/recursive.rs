@@ -22,7 +22,6 @@ use crate::local::Equation;
 use crate::math::Random;
 use crate::scene::EmitterId;
 use crate::scene::emitter::EmitterPoint;
-use crate::scene::geometry::Ray;
 use crate::spectrum::Spectrum;
 use glam::Vec2;
 
@@ -43,16 +42,7 @@ pub fn recursive<R: Record, O: Observe>(
     tally.rays.gather_walks += 1;
     let start = cx.scene.sensor.sample_ray(raster, random.unit2());
     let mut open = Branches::new(BRANCHING);
-    open.start(Branch {
-        ray: Ray { o: start.o, d: start.d, t_max: start.t_max },
-        throughput: Spectrum::ONE * weight,
-        eta: 1.0,
-        length: 0,
-        class: cx.plan.settings.paths.eye(),
-        first_delta: false,
-        last_delta: false,
-        event: None,
-    });
+    open.start(Branch::from_lens(&start, weight, &cx.plan.settings.paths));
     while let Some(branch) = open.take() {
         Step { cx, branch, shadows }.take(&mut open, random, tally);
     }

@@ -144,8 +144,9 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
     if pilot.settings.follows_chains() {
         plan.settings.faint = LEAST;
     }
-    let chains = ChainNoise::measured(pilot, &plan, &pilot.dark_squares());
-    let found = Findings::collected(pilot, plan, paths);
+    let dark_squares = pilot.dark_squares();
+    let chains = ChainNoise::measured(pilot, &plan, &dark_squares);
+    let found = Findings::collected(pilot, plan, &dark_squares, paths);
     let branchings = found.branchings(pilot.settings.faint);
     let ways: Vec<_> = branchings.iter().flat_map(|b| SAMPLES.map(|samples| (b, samples))).collect();
     let pixels = pilot.crop[2].saturating_mul(pilot.crop[3]);

@@ -156,7 +156,7 @@ pub(super) struct Findings {
 
 impl Findings {
     /// From `paths` light paths and as large a part of the pixels, all joins of `plan` on.
-    pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, paths: u32) -> Self {
+    pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, dark_squares: &[f64], paths: u32) -> Self {
         let share = f64::from(paths) / f64::from(plan.light_paths.max(1));
         let squares = pilot.squares();
         let (shot, pieces, subpaths) = shot(pilot, &plan, &squares, paths, share);
@@ -164,7 +164,7 @@ impl Findings {
         let pixels = pilot.crop[2].saturating_mul(pilot.crop[3]);
         let walks = (f64::from(pixels) * share).ceil() as u32;
         plan.inv_light_paths = 1.0 / paths as f32;
-        let eye = gathered(pilot, &plan, &squares, (walks, share), &cache, &Arc::new(subpaths));
+        let eye = gathered(pilot, &plan, (&squares, dark_squares), (walks, share), &cache, &Arc::new(subpaths));
         let (light, merges) = (shot.per_walk(), eye.merges / f64::from(walks.max(1)));
         let mut found = Self { eye: eye.per_walk(), light, merges, branches: eye.branches, evidence: eye.evidence, walks };
         found.evidence.extend(shot.evidence);
@@ -214,12 +214,11 @@ fn shot(pilot: &Pilot<'_>, plan: &Plan, squares: &[f64], paths: u32, share: f64)
 fn gathered(
     pilot: &Pilot<'_>,
     plan: &Plan,
-    squares: &[f64],
+    (squares, dark_squares): (&[f64], &[f64]),
     (walks, share): (u32, f64),
     cache: &LightCache,
     subpaths: &Arc<Vec<Subpath>>,
 ) -> Found {
-    let dark_squares = pilot.dark_squares();
     let follows = plan.settings.follows_chains();
     let found: Vec<Found> = (0..walks.div_ceil(JOB))
         .into_par_iter()
