@@ -64,7 +64,7 @@ fn film(c: &mut Criterion) {
     });
     let layout = Layout { width: 512, height: 384 };
     let pixel = |r: &mut Random| layout.pixel((r.unit() * 512.0) as u32 % 512, (r.unit() * 384.0) as u32 % 384);
-    let splats: Vec<Splat> = (0..65_536).map(|_| Splat { pixel: pixel(&mut random), value: [1.0; 3] }).collect();
+    let splats: Vec<Splat> = (0..65_536).map(|_| Splat { pixel: pixel(&mut random), offset: [0; 2], value: [1.0; 3] }).collect();
     group.throughput(Throughput::Elements(splats.len() as u64));
     let jobs: Vec<Vec<Splat>> = splats.chunks(4096).map(<[Splat]>::to_vec).collect();
     group.bench_function("sort splats", |b| {

@@ -4,7 +4,8 @@
 //! *layer* is all that one join finds of paths of one length, or all paths of one class. Its energy is its mean
 //! over that of the reference, its noise its variance per sample, relative to the reference as in relMSE (of the
 //! mean of the channels). Energies of layers add up to that of the image; variances only where layers of a
-//! pixel do not vary together.
+//! pixel do not vary together. Each pixel is looked at by its own walks alone: where pixels share walks, under filters wider
+//! than they are, the image has less noise, in all layers alike.
 //!
 //! Films of their own, as [`crate::render::layers`] has them, would take many times the memory of the render, and do not
 //! know classes; here a layer is two floats per pixel where it has any light. Of large images some tiles stand for all.

@@ -142,6 +142,23 @@ impl TileBuffer {
             Rounded::Refused => self.dropped += 1,
         }
     }
+
+    /// Adds what is on the grid already.
+    #[inline]
+    pub(super) fn add_exact(&mut self, local: usize, value: Exact) {
+        self.cells[local].add(value);
+    }
+
+    /// Counts contributions that were dropped or cut elsewhere.
+    pub(super) fn count(&mut self, dropped: u64, cut: u64) {
+        self.dropped += dropped;
+        self.cut += cut;
+    }
+
+    /// The grid's exponent.
+    pub(super) fn exponent(&self) -> i32 {
+        self.exponent
+    }
 }
 
 /// Sums of all pixels over a set of passes.
@@ -339,7 +356,7 @@ mod tests {
         let all: Vec<_> = (0..3000)
             .map(|_| {
                 let pixel = layout.pixel(r.below(W), r.below(H));
-                Splat { pixel, value: [r.unit() * 3.0, (20.0 * r.unit()).exp2(), r.unit() * 1e-7] }
+                Splat { pixel, offset: [0; 2], value: [r.unit() * 3.0, (20.0 * r.unit()).exp2(), r.unit() * 1e-7] }
             })
             .collect();
         all.chunks(job).map(<[Splat]>::to_vec).collect()

@@ -36,6 +36,12 @@ impl Exact {
     /// Rounds a contribution to the grid of films with this exponent; nearest, ties away from zero.
     #[inline]
     pub fn round(value: [f32; 3], exponent: i32) -> Rounded {
+        Self::round_below(value, exponent, CONTRIBUTION_BITS)
+    }
+
+    /// The same, cut to `2^limit − 1` steps.
+    #[inline]
+    pub fn round_below(value: [f32; 3], exponent: i32, limit: i32) -> Rounded {
         let mut out = [0i128; 3];
         let mut cut = false;
         for (o, v) in out.iter_mut().zip(value) {
@@ -47,7 +53,7 @@ impl Exact {
             // |v| = m · 2^(max(biased, 1) − 150); subnormal numbers have no hidden bit.
             let m = (bits & 0x7f_ffff) | (u32::from(biased != 0) << 23);
             let shift = biased.max(1) as i32 - 150 + FRACTION_BITS - exponent;
-            let (q, over) = shift_round(u64::from(m), shift, CONTRIBUTION_BITS);
+            let (q, over) = shift_round(u64::from(m), shift, limit);
             cut |= over;
             *o = if v.is_sign_negative() { -(q as i128) } else { q as i128 };
         }
@@ -60,6 +66,12 @@ impl Exact {
         for (a, b) in self.0.iter_mut().zip(other.0) {
             *a = a.wrapping_add(b);
         }
+    }
+
+    /// Times a whole number, modulo 2¹²⁸.
+    #[inline]
+    pub fn times(self, factor: i128) -> Self {
+        Self(self.0.map(|x| x.wrapping_mul(factor)))
     }
 
     /// Nothing in any channel.

@@ -4,7 +4,8 @@
 //!
 //! A gathering walk draws its offset from `|h|` and carries `sign(h) ∫|h| / ∫h`. A splat at `p` goes
 //! to one pixel `j` of those whose filter reaches it, with probability `|h(p − c_j)| / Σ_i |h(p − c_i)|`,
-//! and carries `sign(h) Σ_i |h(p − c_i)| / ∫h`. Both estimate the same `Φ_j` without bias.
+//! and carries `sign(h) Σ_i |h(p − c_i)| / ∫h`. Both estimate the same `Φ_j` without bias. That is all there is
+//! to a pixel alone; in a film the pixels around it share what is found ([`super::reconstruct`]).
 //!
 //! What is tabulated is `h` itself: `h` *is* the linear interpolation of its formula between
 //! [`CELLS`] knots for each stretch without change of sign (off by less than 3e-6 of the peak).
@@ -12,6 +13,7 @@
 //! are exactly constant, and the two agree exactly instead of up to a table's error.
 //! Mitsuba evaluates its Gaussian by a polynomial that is off by up to 5e-4; here it is the formula.
 
+use super::reconstruct::Weights;
 use crate::describe::FilterDescription;
 use glam::Vec2;
 use std::f64::consts::PI;
@@ -20,7 +22,7 @@ use std::f64::consts::PI;
 pub const CELLS: usize = 1024;
 /// Largest radius in pixels; wider filters are refused.
 pub const MAX_RADIUS: f32 = 16.0;
-const MAX_SUPPORT: usize = 2 * MAX_RADIUS as usize + 1;
+pub(super) const MAX_SUPPORT: usize = 2 * MAX_RADIUS as usize + 1;
 
 /// A filter ready for sampling.
 #[derive(Clone, Debug)]
@@ -102,6 +104,32 @@ impl Filter {
                 (Vec2::new(x, y), w_x * w_y)
             }
         }
+    }
+
+    /// How many pixels away it still takes something; 0 for the box, which takes only what falls into its own.
+    pub fn reach(&self) -> i32 {
+        self.table.as_ref().map_or(0, |t| (t.radius - 0.5).ceil().max(0.0) as i32)
+    }
+
+    /// For all gathering walks of a pass, along one axis: their offset from the centres of their pixels, and what a pixel
+    /// takes of those around it. `None` for the box.
+    pub(super) fn taps(&self, u: f32) -> Option<(f32, Weights)> {
+        let t = self.table.as_ref()?;
+        let (x, _) = t.sample(u);
+        let offset = x - (x + 0.5).floor();
+        let mut values = [0f32; MAX_SUPPORT];
+        let (first, count) = t.around(offset, &mut values);
+        let sum: f32 = values[..count].iter().map(|v| v.abs()).sum();
+        (sum > 0.0).then(|| (offset, Weights::new(first, &values[..count], t.ratio / sum, true)))
+    }
+
+    /// For a splat, along one axis: what the pixels around take of it, pixel i the one whose centre is i + ½. `None` for
+    /// the box.
+    pub(super) fn dealt(&self, p: f32) -> Option<Weights> {
+        let t = self.table.as_ref()?;
+        let mut values = [0f32; MAX_SUPPORT];
+        let (first, count) = t.around(0.5 - p, &mut values);
+        Some(Weights::new(first, &values[..count], t.inverse_integral, false))
     }
 
     /// For a splat at raster point `p` (pixel (i, j) covers [i, i+1) × [j, j+1)): column and row of a
@@ -190,22 +218,28 @@ impl Table {
         0.0
     }
 
-    /// Pixel along one axis and weight.
+    /// `h` at all `k + offset` within its radius, k whole: the first k and how many.
     #[inline]
-    fn choose(&self, p: f32, u: f32) -> Option<(i32, f32)> {
-        let first = (p - self.radius - 0.5).ceil() as i32;
-        let mut values = [0f32; MAX_SUPPORT];
+    fn around(&self, offset: f32, values: &mut [f32; MAX_SUPPORT]) -> (i32, usize) {
+        let first = (-offset - self.radius).ceil() as i32;
         let mut count = 0;
-        let mut sum = 0.0;
         while count < MAX_SUPPORT {
-            let distance = (first + count as i32) as f32 + 0.5 - p;
+            let distance = (first + count as i32) as f32 + offset;
             if distance >= self.radius {
                 break;
             }
             values[count] = self.eval(distance);
-            sum += values[count].abs();
             count += 1;
         }
+        (first, count)
+    }
+
+    /// Pixel along one axis and weight.
+    #[inline]
+    fn choose(&self, p: f32, u: f32) -> Option<(i32, f32)> {
+        let mut values = [0f32; MAX_SUPPORT];
+        let (first, count) = self.around(0.5 - p, &mut values);
+        let sum: f32 = values[..count].iter().map(|v| v.abs()).sum();
         let mut left = u * sum;
         let mut chosen = None;
         for (i, v) in values[..count].iter().enumerate() {

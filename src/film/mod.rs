@@ -15,12 +15,14 @@
 //! - [`accumulator`]: the film itself.
 //! - [`splat`]: messages from shooting walks, sorted by tile.
 //! - [`filter`]: reconstruction filters for both walkers.
+//! - [`reconstruct`]: pixels share walks and splats where filters are wider than a pixel.
 
 pub mod accumulator;
 pub mod exact;
 pub mod filter;
 pub mod layout;
 pub mod passes;
+pub mod reconstruct;
 pub mod splat;
 
 pub use accumulator::{Film, FilmError, Identity, MergeError, Tile, TileBuffer};
@@ -28,4 +30,5 @@ pub use exact::{Exact, Rounded};
 pub use filter::Filter;
 pub use layout::{Layout, Rect, TILE};
 pub use passes::PassSet;
+pub use reconstruct::{Dealt, Patch, Sharing, Taps};
 pub use splat::{Splat, SplatBins};

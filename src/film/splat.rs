@@ -14,6 +14,8 @@ use rayon::prelude::*;
 pub struct Splat<V = [f32; 3]> {
     /// Pixel number.
     pub pixel: u32,
+    /// Where in it, as [`super::Sharing::place`] says; nothing where the filter is a box.
+    pub offset: [i16; 2],
     /// Linear sRGB, or that and what else the film's owner wants to know of a contribution.
     pub value: V,
 }

@@ -2,10 +2,12 @@
 
 pub mod distribution;
 pub mod frame;
+mod prefetch;
 pub mod quadtree;
 pub mod random;
 mod sobol;
 pub mod warp;
 
 pub use frame::Frame;
+pub use prefetch::prefetch;
 pub use random::Random;

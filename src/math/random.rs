@@ -50,6 +50,8 @@ pub enum Family {
     Elements = 5,
     /// Samples of chains of Dirac events alone, indexed by pixel.
     Chain = 6,
+    /// What all pixels of a pass have in common.
+    Film = 7,
 }
 
 /// Mixes 64 bits so that every input bit reaches every output bit (finaliser of SplitMix64).

@@ -3,6 +3,7 @@
 use super::class::Positions;
 use super::merge::PointGrid;
 use super::mis::Partial;
+use crate::math::{Random, prefetch};
 use crate::scene::{EmitterId, Surface};
 use crate::spectrum::Spectrum;
 use glam::Vec3;
@@ -80,10 +81,35 @@ impl LightCache {
         &self.pieces[piece][(i - self.starts[piece]) as usize]
     }
 
+    /// One of the vertices with its index, all alike; it is asked for, to be there when it is looked at.
+    #[inline]
+    pub fn pick(&self, random: &mut Random) -> Option<(u32, &LightVertex)> {
+        let i = random.below(self.len());
+        let vertex = (!self.is_empty()).then(|| self.get(i))?;
+        prefetch(vertex);
+        Some((i, vertex))
+    }
+
     /// Calls `visit` with every vertex for merges, and its index, whose squared distance from `p` is
     /// below `radius2`, at most the square of the radius given to [`Self::new`].
     #[inline]
     pub fn around(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(u32, &LightVertex)) {
-        self.grid.around(p, radius2, |i| visit(i, self.get(i)));
+        // They lie all over memory: some are asked for at a time, then looked at.
+        let mut some: [(u32, Option<&LightVertex>); 16] = [(0, None); 16];
+        let mut n = 0;
+        let mut look = |some: &[(u32, Option<&LightVertex>)]| {
+            some.iter().for_each(|(i, v)| v.iter().for_each(|v| visit(*i, v)));
+        };
+        self.grid.around(p, radius2, |i| {
+            let vertex = self.get(i);
+            prefetch(vertex);
+            some[n] = (i, Some(vertex));
+            n += 1;
+            if n == some.len() {
+                look(&some);
+                n = 0;
+            }
+        });
+        look(&some[..n]);
     }
 }

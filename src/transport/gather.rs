@@ -75,6 +75,8 @@ pub fn follow<R: Record, O: Observe>(
     };
     loop {
         tally.rays.gather += 1;
+        // Light vertices lie all over memory: the first is asked for while the ray is on its way.
+        let picked = if plan.c > 0.0 { lights.pick(random) } else { None };
         let Some(hit) = scene.geometry.intersect(&ray) else {
             hit_environment(cx, &walk, ray.d, tally);
             return;
@@ -102,8 +104,8 @@ pub fn follow<R: Record, O: Observe>(
             if plan.settings.techniques.next_event {
                 next_event(cx, &walk, &vertex, partial, random, tally);
             }
-            if plan.c > 0.0 {
-                connect(cx, &walk, &vertex, partial, lights, random, tally);
+            if let Some(picked) = picked {
+                connect(cx, &walk, &vertex, partial, (lights, picked), random, tally);
             }
             if walk.focused && !vertex.focused && cx.merge_radius2 > 0.0 {
                 merge(cx, &walk, &vertex, partial, lights, tally);
@@ -319,28 +321,27 @@ fn next_event<R: Record, O: Observe>(
     finish(cx, path, value, join, 1, tally);
 }
 
-/// Joins `vertex` to light vertices picked uniformly from the cache.
+/// Joins `vertex` to light vertices picked uniformly from the cache, `picked` the first of them.
 #[inline]
 fn connect<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,
     vertex: &Vertex<'_>,
     partial: Partial<f32>,
-    lights: &LightCache,
+    (lights, mut picked): (&LightCache, (u32, &LightVertex)),
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
     let (scene, plan) = (cx.scene, cx.plan);
-    let available = lights.len();
-    if available == 0 {
-        return;
-    }
     // The estimator uses this pass's own number of vertices, the weights the pilot's.
-    let inv_prob = available as f32 * plan.inv_light_paths / plan.settings.connections as f32;
+    let inv_prob = lights.len() as f32 * plan.inv_light_paths / plan.settings.connections as f32;
     let h = plan.settings.heuristic;
-    for _ in 0..plan.settings.connections {
-        let picked = random.below(available);
-        let y = lights.get(picked);
+    for i in 0..plan.settings.connections {
+        if i > 0 {
+            let Some(next) = lights.pick(random) else { return };
+            picked = next;
+        }
+        let (index, y) = picked;
         let length = walk.length + 2 + y.length;
         if !plan.wants_length(length) {
             continue;
@@ -375,7 +376,7 @@ fn connect<R: Record, O: Observe>(
         if !scene.geometry.visible(end(&vertex.surface), end(&y.surface)) {
             continue;
         }
-        meet(cx, walk, Technique::Connect, (picked, y), length, (value, weight), tally);
+        meet(cx, walk, Technique::Connect, (index, y), length, (value, weight), tally);
     }
 }
 

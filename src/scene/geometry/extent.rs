@@ -55,7 +55,7 @@ impl Geometry {
 
     fn extent_of_mesh(&self, shape: u32, first: u32) -> Extent {
         // All triangles of a shape follow each other.
-        let prims = self.prims[first as usize..].iter().take_while(|p| p.shape == shape && p.v[0] != NONE);
+        let prims = self.tree.prims[first as usize..].iter().take_while(|p| p.shape == shape && p.v[0] != NONE);
         let bounds = Aabb::around(prims.clone().flat_map(|p| self.corner_points(p)));
         let center = bounds.center().as_dvec3();
         let (mut reach2, mut area, mut sum, mut two_sided) = (0.0f64, 0.0f64, DVec3::ZERO, false);

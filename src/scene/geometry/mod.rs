@@ -44,7 +44,7 @@ pub use surface::offset_origin;
 
 use crate::describe::Problems;
 use crate::scene::Surface;
-use bake::{Baked, Prim, Sampler, Shape, Vertex};
+use bake::{Baked, Sampler, Shape, Vertex};
 use build_tree::{Growing, Item};
 use glam::Vec3;
 use instance::Instance;
@@ -60,7 +60,6 @@ pub type End = (Vec3, f32, Vec3);
 pub struct Geometry {
     tree: Tree,
     wide: bool,
-    prims: Pages<Prim>,
     vertices: Pages<Vertex>,
     shapes: Vec<Shape>,
     samplers: Vec<(Sampler, f64)>,
@@ -126,11 +125,11 @@ impl Geometry {
                 blocks: Pages::new(&growing.blocks),
                 analytic: std::mem::take(&mut baked.analytic),
                 instances,
+                prims: Pages::new(&baked.prims),
                 root,
             },
             wide: wide_available(),
             triangles: baked.prims.iter().filter(|p| p.v[0] != NONE).count(),
-            prims: Pages::new(&baked.prims),
             vertices: Pages::new(&baked.vertices),
             shapes: baked.shapes,
             samplers: baked.samplers,
@@ -175,7 +174,7 @@ impl Geometry {
     /// The surface point that `ray` met at `hit`.
     #[inline]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        let prim = &self.prims[hit.prim as usize];
+        let prim = &self.tree.prims[hit.prim as usize];
         let shape = &self.shapes[prim.shape as usize];
         if prim.v[0] != NONE && hit.instance == NONE {
             triangle::surface(prim.v.map(|i| &self.vertices[i as usize]), shape, hit.u, hit.v).on(prim.shape, shape)
@@ -187,7 +186,7 @@ impl Geometry {
     /// The same for analytic shapes and for all that is seen through an instance.
     #[inline(never)]
     fn rare_surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        let prim = &self.prims[hit.prim as usize];
+        let prim = &self.tree.prims[hit.prim as usize];
         let shape = &self.shapes[prim.shape as usize];
         let instance = if hit.instance == NONE { None } else { Some(&self.tree.instances[hit.instance as usize]) };
         let local = if prim.v[0] != NONE {
@@ -250,7 +249,7 @@ impl Geometry {
             + size_of_val(&self.tree.blocks[..])
             + size_of_val(&self.tree.analytic[..])
             + size_of_val(&self.tree.instances[..])
-            + size_of_val(&self.prims[..])
+            + size_of_val(&self.tree.prims[..])
             + size_of_val(&self.vertices[..])
             + size_of_val(&self.shapes[..])
             + self.samplers.iter().map(cdf).sum::<usize>()

@@ -69,7 +69,7 @@ impl Geometry {
     }
 
     fn piece(&self, prim: u32, instance: u32) -> Piece {
-        let shape_index = self.prims[prim as usize].shape;
+        let shape_index = self.tree.prims[prim as usize].shape;
         let shape = &self.shapes[shape_index as usize];
         let mut piece = Piece {
             prim,
@@ -78,16 +78,16 @@ impl Geometry {
             material: shape.material,
             emitter: shape.emitter,
             area: 0.0,
-            triangle: self.prims[prim as usize].v[0] != NONE,
+            triangle: self.tree.prims[prim as usize].v[0] != NONE,
             even: true,
             smooth: false,
         };
         if piece.triangle {
             let [a, b, c] = self.corners(&piece);
             piece.area = 0.5 * (b - a).cross(c - a).length();
-            piece.smooth = shape.has_normals && self.is_smooth(&self.prims[prim as usize]);
+            piece.smooth = shape.has_normals && self.is_smooth(&self.tree.prims[prim as usize]);
         } else {
-            let form = &self.tree.analytic[self.prims[prim as usize].v[1] as usize].0;
+            let form = &self.tree.analytic[self.tree.prims[prim as usize].v[1] as usize].0;
             piece.area = form.area();
             if instance != NONE {
                 let [a, b, c] = self.corners(&piece);
@@ -118,7 +118,7 @@ impl Geometry {
 
     /// The point of a piece with parameters `st`.
     pub fn piece_point(&self, piece: &Piece, st: Vec2) -> Surface {
-        let prim = &self.prims[piece.prim as usize];
+        let prim = &self.tree.prims[piece.prim as usize];
         let shape = &self.shapes[prim.shape as usize];
         let local = if piece.triangle {
             triangle::surface(prim.v.map(|i| &self.vertices[i as usize]), shape, st.x, st.y)
@@ -141,7 +141,7 @@ impl Geometry {
     /// Parameters of the point that a ray met, in the chart of its piece.
     #[inline]
     pub fn chart(&self, hit: &Hit, surface: &Surface) -> Vec2 {
-        let prim = &self.prims[hit.prim as usize];
+        let prim = &self.tree.prims[hit.prim as usize];
         if prim.v[0] != NONE {
             return Vec2::new(hit.u, hit.v);
         }

@@ -42,7 +42,7 @@ impl Geometry {
                 let i = cdf.partition_point(|c| *c <= x).clamp(1, cdf.len() - 1) - 1;
                 let rest = (((x - cdf[i]) / (cdf[i + 1] - cdf[i])) as f32).clamp(0.0, ONE_MINUS_EPSILON);
                 let b = triangle_uniform(Vec2::new(rest, u.y));
-                self.triangle_point(shape, self.prims[(first + i as u32) as usize].v, b.x, b.y, p_a)
+                self.triangle_point(shape, self.tree.prims[(first + i as u32) as usize].v, b.x, b.y, p_a)
             }
             // The first triangle's edges are a → b and a → c = b + (d − a).
             Sampler::Parallelogram { v, .. } => self.triangle_point(shape, *v, u.x - u.y, u.y, p_a),

@@ -46,7 +46,7 @@ pub(super) fn placed(r: &mut Random, reach: f32) -> Mat4 {
 fn reference(g: &Geometry, prims: std::ops::Range<usize>, ray: &Ray) -> Option<(f64, usize)> {
     let mut best: Option<(f64, usize)> = None;
     for i in prims {
-        let prim = g.prims[i];
+        let prim = g.tree.prims[i];
         let t = if prim.v[0] == NONE {
             g.tree.analytic[prim.v[1] as usize].0.intersect(ray.o, ray.d, ray.t_max).map(f64::from)
         } else {
@@ -88,7 +88,7 @@ fn sample_ray(r: &mut Random) -> Ray {
 /// Rays whose outcome is not the reference's; a few graze an edge, where rounding may decide.
 fn disagreements(g: &Geometry, instances: &[(usize, Mat4)], rays: usize, seed: u64) -> usize {
     let mut r = random(seed);
-    let top = g.prims.len() - instances.len().min(1) * instances.first().map_or(0, |i| g.prims.len() - i.0);
+    let top = g.tree.prims.len() - instances.len().min(1) * instances.first().map_or(0, |i| g.tree.prims.len() - i.0);
     let mut bad = 0;
     for _ in 0..rays {
         let ray = sample_ray(&mut r);
@@ -96,7 +96,7 @@ fn disagreements(g: &Geometry, instances: &[(usize, Mat4)], rays: usize, seed: u
         for (first, to_world) in instances {
             let inverse = to_world.inverse();
             let inner = Ray { o: inverse.transform_point3(ray.o), d: inverse.transform_vector3(ray.d), t_max: ray.t_max };
-            let t = reference(g, *first..g.prims.len(), &inner).map(|(t, _)| t);
+            let t = reference(g, *first..g.tree.prims.len(), &inner).map(|(t, _)| t);
             want = [want, t].into_iter().flatten().reduce(f64::min);
         }
         let got = g.intersect(&ray);
@@ -140,7 +140,7 @@ fn all_shapes_and_instances_agree_with_brute_force() {
     let (mut top, group, places) = mixed(&mut random(3));
     top.extend(places.iter().map(|m| ShapeInput::new(Form::Instance { group: 0 }).at(*m)));
     let g = Geometry::build(top, vec![group]).expect("valid shapes");
-    let first = g.prims.iter().position(|p| p.shape as usize >= 20).expect("members of the group");
+    let first = g.tree.prims.iter().position(|p| p.shape as usize >= 20).expect("members of the group");
     let instances: Vec<_> = places.iter().map(|m| (first, *m)).collect();
     let bad = disagreements(&g, &instances, 6000, 9);
     assert!(bad <= 3, "{bad} of 6000 rays");
@@ -185,7 +185,7 @@ fn a_tree_that_only_halves_finds_the_same() {
     let mut r = random(13);
     let rays: Vec<Ray> = (0..3000).map(|_| sample_ray(&mut r)).collect();
     let before: Vec<_> = rays.iter().map(|ray| g.intersect(ray)).collect();
-    let corners = |i: usize| g.prims[i].v.map(|v| g.vertices[v as usize].p);
+    let corners = |i: usize| g.tree.prims[i].v.map(|v| g.vertices[v as usize].p);
     let items: Vec<Item> = (0..3000).map(|i| Item::Triangle(i as u32, corners(i))).collect();
     let boxes: Vec<Aabb> = (0..3000).map(|i| Aabb::around(corners(i))).collect();
     let mut growing = Growing::default();

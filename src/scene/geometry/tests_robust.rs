@@ -41,7 +41,7 @@ fn ball(n: u32, m: u32, bump: f32, r: &mut Random) -> (Vec<Vec3>, Vec<[u32; 3]>)
 fn escapes(g: &Geometry, inside: impl Fn(&mut Random) -> Vec3, to_tree: Mat4, rays: usize, r: &mut Random) -> usize {
     let mut lost = 0;
     for _ in 0..rays {
-        let prim = g.prims[r.below(g.prims.len() as u32) as usize];
+        let prim = g.tree.prims[r.below(g.tree.prims.len() as u32) as usize];
         let [a, b, _] = prim.v.map(|v| to_tree.transform_point3(g.vertices[v as usize].p));
         let u = [0.0, 1.0, 0.5, r.unit()][r.below(4) as usize];
         let o = inside(r);
@@ -85,7 +85,7 @@ fn self_hits(g: &Geometry, n: usize, r: &mut Random) -> usize {
     let mut bad = 0;
     for _ in 0..n {
         // Aimed at some triangle, so that small ones beside huge ones get their share.
-        let (target, o) = (g.prims[r.below(g.prims.len() as u32) as usize], ball.0 + vec3(r) * ball.1);
+        let (target, o) = (g.tree.prims[r.below(g.tree.prims.len() as u32) as usize], ball.0 + vec3(r) * ball.1);
         let to = if target.v[0] == NONE { ball.0 } else { g.vertices[target.v[0] as usize].p };
         let ray = Ray { o, d: to - o + vec3(r) * (to - o).length() * 1e-3, t_max: f32::INFINITY };
         let Some(hit) = g.intersect(&ray) else { continue };

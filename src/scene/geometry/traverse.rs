@@ -268,7 +268,12 @@ pub(super) fn traverse<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, 
             if code & KIND == TRIANGLES {
                 // SAFETY: codes of this kind hold indices of `blocks`, by construction of the tree.
                 let block = unsafe { tree.blocks.get_unchecked((code & !LEAF) as usize) };
+                let before = hit.prim;
                 meet_block(block, &wide, t_far, &mut hit);
+                // Whoever asks for the nearest hit looks at its primitive next.
+                if !ANY && hit.prim != before {
+                    L::prefetch::<1, _>(tree.prims.as_ptr().wrapping_add(hit.prim as usize));
+                }
             } else {
                 let other = meet_other::<L, ANY, TOP>(tree, code, ray, hit.t);
                 if other.prim != NONE {

@@ -7,6 +7,7 @@
 //! A child is one `u32`: an inner node's index, or `LEAF | kind | index`.
 
 use super::analytic::Analytic;
+use super::bake::Prim;
 use super::instance::Instance;
 use super::pages::Pages;
 use super::ray::Aabb;
@@ -80,6 +81,8 @@ pub(super) struct Tree {
     pub(super) analytic: Vec<(Analytic, u32)>,
     /// Instances.
     pub(super) instances: Vec<Instance>,
+    /// What the primitives are.
+    pub(super) prims: Pages<Prim>,
     /// Code of the scene's root.
     pub(super) root: u32,
 }
