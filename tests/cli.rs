@@ -422,10 +422,10 @@ fn pyramid_and_light_groups_of_one_render() {
     let entries = table.as_array().expect("a list");
     let energy: f64 = entries.iter().filter_map(|e| e["share_of_energy"].as_f64()).sum();
     assert!((energy - 1.0).abs() < 1e-5, "{energy}");
-    // Lights are hit, floors lit by hits and next events; of longer paths there are all four.
+    // Lights are hit or splatted, floors lit by hits and next events; of longer paths there are all four.
     let names: Vec<String> =
         entries.iter().map(|e| format!("{} {}", e["length"], e["technique"].as_str().unwrap_or(""))).collect();
-    assert_eq!(names, ["1 hit", "2 hit", "2 nee", "3 hit", "3 nee", "3 connect", "3 splat"]);
+    assert_eq!(names, ["1 hit", "1 splat", "2 hit", "2 nee", "3 hit", "3 nee", "3 connect", "3 splat"]);
     let direct = read_image(&pyramid.join("k2.s1t2.exr")).expect("an image of a join");
     assert!(direct.rgb("raw").is_some() && direct.rgb("variance").is_some() && direct.rgb("rawVariance").is_some());
     for sheet in ["weighted.png", "raw.png"] {

@@ -3,6 +3,8 @@
 //! is planted for the whole process.
 #![cfg(feature = "mutants")]
 
+#[path = "physics/lights.rs"]
+mod lights;
 #[path = "physics/mirrors.rs"]
 mod mirrors;
 #[path = "physics/scenes.rs"]
@@ -14,7 +16,7 @@ mod support;
 
 use nephroid::proof::adjoint::{ALPHA, Effort as Draws, adjoint};
 use nephroid::proof::residual;
-use nephroid::render::Options;
+use nephroid::render::{Estimator, Options};
 use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
@@ -191,6 +193,22 @@ fn planted_mistakes_multiply_chains() {
         agreement(&one, &many).p
     });
     println!("ChainPart: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
+    assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
+}
+
+/// `lamps::lamps_are_divided_between_hits_and_splats` notices one that both find.
+#[test]
+fn planted_mistakes_double_lamps() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let world = lights::lights(true);
+    let hits = lights::of(&world, Estimator::Gather, 1, 0);
+    let [sound, mistaken] = [None, Some(Mutant::LampTwice)].map(|m| {
+        plant(m);
+        let both = lights::of(&world, Estimator::Bidirectional, 1, 200);
+        plant(None);
+        agreement(&hits, &both).p
+    });
+    println!("LampTwice: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
     assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
 }
 

@@ -116,11 +116,10 @@ impl Joins {
         let mut out = Self { list: Vec::new(), longest, table: vec![u16::MAX; TECHNIQUES * Self::place(longest + 2, 0)] };
         for length in 1..=longest {
             for s in 0..=length {
-                // As the walks do: lights seen directly are hit where hits are on, and where next events
-                // are on, splats leave direct light to them.
+                // As the walks do: where next events are on, splats leave direct light to them.
                 let technique = match s {
                     0 => Technique::Hit,
-                    _ if s == length && (length > 1 || !t.hit) && (length != 2 || !t.next_event) => Technique::Splat,
+                    _ if s == length && (length != 2 || !t.next_event) => Technique::Splat,
                     1 if length > 1 => Technique::NextEvent,
                     _ if s < length => Technique::Connect,
                     _ => continue,

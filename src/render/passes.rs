@@ -181,7 +181,7 @@ impl Gathering<'_> {
         let (x, y) = (i64::from(self.crop[0]) + i64::from(x), i64::from(self.crop[1]) + i64::from(y));
         let [width, height] = self.film.map(i64::from);
         let inside = (0..width).contains(&x) && (0..height).contains(&y);
-        let beyond = || 1 << 63 | (y + MARGIN) * (width + 2 * MARGIN) + x + MARGIN;
+        let beyond = || i64::MIN | ((y + MARGIN) * (width + 2 * MARGIN) + x + MARGIN);
         let id = if inside { y * width + x } else { beyond() };
         (Vec2::new(x as f32, y as f32), id as u64)
     }

@@ -17,7 +17,7 @@ use crate::math::Random;
 use crate::scene::EmitterId;
 use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::Ray;
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
 /// After so many events, where mirrors could go on for ever, branches are followed with a probability only,
 const LONG: u32 = 16;
@@ -51,7 +51,7 @@ pub fn follow<R: Record, O: Observe>(
     if ways == 0 || (ways == 1 && vertex.closure.is_delta()) {
         return false;
     }
-    explore(cx, &mut open, weight, random, tally);
+    explore(cx, &mut open, (walk.from, weight), random, tally);
     tally.observe.returned(walk.length as usize);
     tally.observe.arrived(&vertex.surface);
     true
@@ -69,14 +69,14 @@ pub fn sample<R: Record, O: Observe>(
     tally.observe.started(start.lens, None);
     let mut open = Branches::new(u32::MAX);
     open.start(Branch::from_lens(&start, weight, &cx.plan.settings.paths));
-    explore(cx, &mut open, weight, random, tally);
+    explore(cx, &mut open, (start.lens, weight), random, tally);
 }
 
 /// Follows all that is open, and what becomes of it.
 fn explore<R: Record, O: Observe>(
     cx: Context<'_>,
     open: &mut Branches,
-    weight: f32,
+    (lens, weight): (Vec3, f32),
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
@@ -107,14 +107,14 @@ fn explore<R: Record, O: Observe>(
         tally.rays.gather += 1;
         let Some(hit) = scene.geometry.intersect(&branch.ray) else {
             scene.lights.environment(branch.ray.d, |emitter, radiance| {
-                chain_hit(cx, &branch, &EmitterPoint::at_infinity(emitter, branch.ray.d), radiance, tally);
+                chain_hit(cx, (lens, &branch), &EmitterPoint::at_infinity(emitter, branch.ray.d), radiance, tally);
             });
             continue;
         };
         let surface = scene.geometry.surface(&branch.ray, &hit);
         if surface.emitter != EmitterId::NONE {
             let point = EmitterPoint::on_surface(&surface);
-            chain_hit(cx, &branch, &point, scene.lights.radiance(&point, -branch.ray.d), tally);
+            chain_hit(cx, (lens, &branch), &point, scene.lights.radiance(&point, -branch.ray.d), tally);
         }
         if branch.length + 1 < plan.settings.max_length && scene.materials.has_delta(surface.material) {
             tally.observe.arrived(&surface);

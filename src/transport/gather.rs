@@ -7,6 +7,7 @@ use super::branch::Branch;
 use super::cache::{LightCache, LightVertex};
 use super::chain;
 use super::class::{Finished, Positions, Symbol};
+use super::lamp;
 use super::mis::{self, Partial};
 use super::mutant::{Mutant, planted};
 use super::vertex::Vertex;
@@ -194,6 +195,9 @@ fn hit<R: Record, O: Observe>(
     }
     let length = walk.length + 1;
     let weight = if length == 1 {
+        if lamp::is_splatted(cx, walk.from, point, d, area_density(cx, point, d, arrival.inv_d2)) {
+            return;
+        }
         1.0
     } else {
         let nu = if plan.settings.techniques.next_event && !walk.delta {
@@ -216,10 +220,16 @@ fn hit<R: Record, O: Observe>(
     arrived_on_light(cx, (walk.class, walk.first_delta, walk.delta), length, point, (value, weight), tally);
 }
 
+/// Steradians at the lens, per m² at a light point on which `d` arrives; one where it is a direction itself.
+#[inline]
+fn area_density(cx: Context<'_>, point: &EmitterPoint, d: Vec3, inv_d2: f32) -> f32 {
+    if cx.scene.lights.is_infinite(point.emitter) { 1.0 } else { point.n_g.dot(d).abs() * inv_d2 }
+}
+
 /// A chain of Dirac events arrived on a light: no other join makes its path.
 pub(super) fn chain_hit<R: Record, O: Observe>(
     cx: Context<'_>,
-    branch: &Branch,
+    (lens, branch): (Vec3, &Branch),
     point: &EmitterPoint,
     radiance: Spectrum,
     tally: &mut Tally<'_, R, O>,
@@ -227,6 +237,13 @@ pub(super) fn chain_hit<R: Record, O: Observe>(
     let length = branch.length + 1;
     if radiance.is_black() || !cx.plan.wants_length(length) {
         return;
+    }
+    if length == 1 {
+        let inv_d2 = if cx.scene.lights.is_infinite(point.emitter) { 1.0 } else { (point.y - lens).length_squared().recip() };
+        let d = branch.ray.d;
+        if lamp::is_splatted(cx, lens, point, d, area_density(cx, point, d, inv_d2)) {
+            return;
+        }
     }
     let value = branch.throughput * radiance * cx.chain_part;
     arrived_on_light(cx, (branch.class, branch.first_delta, branch.last_delta), length, point, (value, 1.0), tally);

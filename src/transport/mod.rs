@@ -14,6 +14,7 @@
 //! - [`vertex`]: the one kernel of both equations.
 //! - [`walk`]: one step of either walker.
 //! - [`gather`], [`shoot`]: the two walks, alike on purpose.
+//! - `lamp`: paths without a vertex between, lamps seen directly.
 //! - [`recursive`]: part of the coupling, or none: recursive ray tracing, local illumination.
 //! - [`chain`], [`branch`]: Dirac events followed in all directions, beside a gathering walk.
 //! - [`cache`], [`merge`]: light vertices kept for connections and merges.
@@ -24,6 +25,7 @@ pub mod cache;
 pub mod chain;
 pub mod class;
 pub mod gather;
+mod lamp;
 pub mod merge;
 pub mod mis;
 pub mod mutant;

@@ -26,6 +26,8 @@ pub enum Mutant {
     ChainTwice = 9,
     /// A walk counts its chain in full beside the samples of chains of its pixel.
     ChainPart = 10,
+    /// A hit counts a lamp that a splat counts as well.
+    LampTwice = 11,
 }
 
 #[cfg(feature = "mutants")]

@@ -196,8 +196,8 @@ pub struct Plan {
     pub merge_radius: f32,
     /// Reverse densities matter: both walkers take part in the weights.
     pub two_sided: bool,
-    /// Shooting makes paths of length 1 (hits are off).
-    pub splat_emitters: bool,
+    /// Hits and splats both make paths of length 1, each where it makes more of them.
+    pub shares_lamps: bool,
     /// Splats take part in paths of length 2. Not where next events do: those see all such paths, often
     /// without any noise (delta lights), which no weight that ignores variance would honour.
     pub splat_direct: bool,
@@ -232,7 +232,7 @@ impl Plan {
             c,
             merge_radius: if t.merge { settings.merge_radius.unwrap_or(0.0) } else { 0.0 },
             two_sided: light_paths > 0 && t.gathers(),
-            splat_emitters: t.splat && !t.hit,
+            shares_lamps: t.splat && t.hit,
             splat_direct: t.splat && !t.next_event,
             inv_light_paths: if light_paths > 0 { 1.0 / normaliser as f32 } else { 0.0 },
             guide: Guide::default(),

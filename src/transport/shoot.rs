@@ -5,6 +5,7 @@
 
 use super::cache::LightVertex;
 use super::class::{Finished, Symbol};
+use super::lamp;
 use super::mis::{self, Partial};
 use super::vertex::Vertex;
 use super::walk::{Chain, Context, Join, Observe, Tally, Walk, end, free, spawn};
@@ -12,7 +13,7 @@ use super::{Contribution, Record, Technique};
 use crate::local::Equation;
 use crate::math::Random;
 use crate::scene::EmitterId;
-use crate::scene::emitter::Emission;
+use crate::scene::emitter::{Emission, EmitterPoint};
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::scene::sensor::SensorConnection;
 use crate::spectrum::Spectrum;
@@ -28,8 +29,8 @@ pub fn shoot<R: Record, O: Observe>(
     tally: &mut Tally<'_, R, O>,
 ) {
     let (scene, plan) = (cx.scene, cx.plan);
-    if plan.splat_emitters && plan.wants_length(1) {
-        splat_emitter(cx, random, tally);
+    if plan.settings.techniques.splat && plan.wants_length(1) {
+        lamp::splat(cx, random, tally);
     }
     // Direction and position are the four axes that are most evenly filled.
     let (u_direction, u_position, u_pick) = (random.axis2(), random.axis2(), random.axis());
@@ -179,47 +180,32 @@ fn splat<R: Record, O: Observe>(
         light_delta: start.delta,
     };
     let lens = vertex.surface.p + c.w / c.inv_d2.sqrt();
-    finish(cx, path, c, (value, weight, start.point.emitter), lens, random, tally);
+    hand_on(cx, path, c, (value, weight, start.point.emitter), lens, random, tally);
 }
 
-/// The lens sees a light point: paths of length 1 where hits are off.
+/// Hands on a lamp that the lens sees directly, if it counts.
 #[inline]
-fn splat_emitter<R: Record, O: Observe>(cx: Context<'_>, random: &mut Random, tally: &mut Tally<'_, R, O>) {
-    let (scene, plan) = (cx.scene, cx.plan);
-    let (u_pick, u, u_lens) = (random.unit(), random.unit2(), random.unit2());
-    let Some((point, p_k)) = scene.lights.sample_point(&scene.geometry, u_pick, u) else { return };
-    let infinite = scene.lights.is_infinite(point.emitter);
-    let c = if infinite { scene.sensor.connect_infinite(point.n_g, u_lens) } else { scene.sensor.connect(point.y, u_lens) };
-    let Some(c) = c else { return };
-    let radiance = scene.lights.radiance(&point, c.w);
-    let cos = if infinite { 1.0 } else { point.n_g.dot(c.w).abs() };
-    let value = radiance * (c.g_dir * cos * c.inv_d2 / p_k * plan.inv_light_paths);
-    if value.is_black() {
-        return;
-    }
-    tally.rays.shadow += 1;
-    let visible = if infinite {
-        scene.geometry.visible_infinite(free(c.end), -point.n_g)
-    } else {
-        scene.geometry.visible((point.y, point.y_error, point.n_g), free(c.end))
-    };
-    if !visible {
-        return;
-    }
+pub(super) fn finish<R: Record, O: Observe>(
+    cx: Context<'_>,
+    c: SensorConnection,
+    (value, point): (Spectrum, &EmitterPoint),
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
     let path = Finished {
-        from_eye: plan.settings.paths.eye(),
-        from_light: plan.settings.paths.light(),
+        from_eye: cx.plan.settings.paths.eye(),
+        from_light: cx.plan.settings.paths.light(),
         length: 1,
         first_delta: false,
         last_delta: false,
         light_delta: false,
     };
-    finish(cx, path, c, (value, 1.0, point.emitter), c.end, random, tally);
+    hand_on(cx, path, c, (value, 1.0, point.emitter), c.end, random, tally);
 }
 
 /// Hands on a finished path if it counts.
 #[inline]
-fn finish<R: Record, O: Observe>(
+fn hand_on<R: Record, O: Observe>(
     cx: Context<'_>,
     path: Finished,
     c: SensorConnection,

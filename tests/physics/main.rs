@@ -6,6 +6,8 @@ mod chains;
 mod choice;
 mod determinism;
 mod furnace;
+mod lamps;
+mod lights;
 mod merging;
 mod mirrors;
 mod scenes;

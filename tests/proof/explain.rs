@@ -16,6 +16,7 @@ fn paths_sum_to_the_pixel_with_the_weights_of_the_walks() {
         options.settings.seed = seed();
         options.settings.max_length = 6;
         options.settings.light_paths = Some(256);
+        options.settings.merge_radius = Some(0.02);
         let found = explain(&world, &options, pixel, Effort { samples: 64, paths: 12 }).unwrap();
         let mean = |m: [f32; 3]| m.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
         // The same random numbers as the measurement's: the same sum, up to the rounding of its film.

@@ -108,6 +108,15 @@ impl Sensor {
         }
     }
 
+    /// The lens point that `u_lens` selects; `None` for parallel projection, where it depends on what is seen.
+    #[inline]
+    pub fn lens_point(&self, u_lens: Vec2) -> Option<Vec3> {
+        match &self.kind {
+            Kind::Projective(s) => Some(s.lens_point(u_lens)),
+            Kind::Orthographic(_) => None,
+        }
+    }
+
     /// The point `x` seen through the lens point that `u_lens` selects; `None` where no pixel of the
     /// crop window can see it: outside the window widened by the filter, nearer than the near plane
     /// or beyond the far plane.

@@ -128,6 +128,11 @@ impl Projective {
     }
 
     #[inline]
+    pub(super) fn lens_point(&self, u_lens: Vec2) -> Vec3 {
+        self.origin + self.axes * self.lens(u_lens)
+    }
+
+    #[inline]
     pub(super) fn sample_ray(&self, raster: Vec2, u_lens: Vec2) -> SensorRay {
         let at_one = ((self.centre - raster) * self.pixel).extend(1.0);
         let lens = self.lens(u_lens);
