@@ -8,7 +8,7 @@
 //! connections share its vertices. A tile therefore also keeps `Σ_p (Σ_j x_jp)²` over its pixels, whence
 //! the variance of its mean with all that its pixels have in common.
 
-use super::exact::{self, Exact, Rounded};
+use super::exact::{self, Exact, Losses};
 use super::layout::{Layout, Rect, TILE_PIXELS};
 use super::passes::PassSet;
 use rayon::prelude::*;
@@ -68,13 +68,15 @@ pub struct Tile {
     cells: [Cell; TILE_PIXELS],
     /// Σ over passes of the square of the sum over pixels.
     block_squares: [u128; 3],
-    dropped: u64,
-    cut: u64,
+    losses: Losses,
 }
 
 impl Tile {
-    const EMPTY: Self =
-        Self { cells: [Cell { sum: Exact::ZERO, squares: [0; 3] }; TILE_PIXELS], block_squares: [0; 3], dropped: 0, cut: 0 };
+    const EMPTY: Self = Self {
+        cells: [Cell { sum: Exact::ZERO, squares: [0; 3] }; TILE_PIXELS],
+        block_squares: [0; 3],
+        losses: Losses { dropped: 0, cut: 0 },
+    };
 
     /// Adds what one pass found at all pixels of the tile, and empties the buffer for the next pass.
     pub fn commit(&mut self, pass: &mut TileBuffer) {
@@ -88,8 +90,7 @@ impl Tile {
             }
         }
         add_squares(&mut self.block_squares, block);
-        self.dropped += std::mem::take(&mut pass.dropped);
-        self.cut += std::mem::take(&mut pass.cut);
+        self.losses.add(std::mem::take(&mut pass.losses));
     }
 
     fn add(&mut self, other: &Self) {
@@ -102,8 +103,7 @@ impl Tile {
         for (s, v) in self.block_squares.iter_mut().zip(other.block_squares) {
             *s = s.wrapping_add(v);
         }
-        self.dropped += other.dropped;
-        self.cut += other.cut;
+        self.losses.add(other.losses);
     }
 }
 
@@ -119,27 +119,21 @@ fn add_squares(squares: &mut [u128; 3], x: Exact) {
 pub struct TileBuffer {
     cells: [Exact; TILE_PIXELS],
     exponent: i32,
-    dropped: u64,
-    cut: u64,
+    losses: Losses,
 }
 
 impl TileBuffer {
     /// Empty, for films with this exponent.
     pub fn new(exponent: i32) -> Self {
-        Self { cells: [Exact::ZERO; TILE_PIXELS], exponent, dropped: 0, cut: 0 }
+        Self { cells: [Exact::ZERO; TILE_PIXELS], exponent, losses: Losses::default() }
     }
 
     /// Adds one contribution (linear sRGB) to the pixel at `local` in the tile. A contribution that
     /// is not finite is dropped and counted.
     #[inline]
     pub fn add(&mut self, local: usize, value: [f32; 3]) {
-        match Exact::round(value, self.exponent) {
-            Rounded::Held(x) => self.cells[local].add(x),
-            Rounded::Cut(x) => {
-                self.cut += 1;
-                self.cells[local].add(x);
-            }
-            Rounded::Refused => self.dropped += 1,
+        if let Some(x) = self.losses.hold(Exact::round(value, self.exponent)) {
+            self.cells[local].add(x);
         }
     }
 
@@ -150,9 +144,8 @@ impl TileBuffer {
     }
 
     /// Counts contributions that were dropped or cut elsewhere.
-    pub(super) fn count(&mut self, dropped: u64, cut: u64) {
-        self.dropped += dropped;
-        self.cut += cut;
+    pub(super) fn count(&mut self, losses: Losses) {
+        self.losses.add(losses);
     }
 
     /// The grid's exponent.
@@ -225,12 +218,12 @@ impl Film {
 
     /// Contributions that were not finite and were left out.
     pub fn dropped(&self) -> u64 {
-        self.tiles.iter().map(|t| t.dropped).sum()
+        self.tiles.iter().map(|t| t.losses.dropped).sum()
     }
 
     /// Contributions beyond the grid that were cut to its limit.
     pub fn cut(&self) -> u64 {
-        self.tiles.iter().map(|t| t.cut).sum()
+        self.tiles.iter().map(|t| t.losses.cut).sum()
     }
 
     /// Tiles with their pixels, for jobs. After all tiles have committed a pass, tell the film by

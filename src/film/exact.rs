@@ -29,6 +29,39 @@ pub enum Rounded {
     Refused,
 }
 
+/// How many contributions were not held as they were.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Not finite, and left out.
+    pub dropped: u64,
+    /// Beyond the grid, and cut to its limit.
+    pub cut: u64,
+}
+
+impl Losses {
+    /// What is left of a contribution.
+    #[inline]
+    pub fn hold(&mut self, rounded: Rounded) -> Option<Exact> {
+        match rounded {
+            Rounded::Held(x) => Some(x),
+            Rounded::Cut(x) => {
+                self.cut += 1;
+                Some(x)
+            }
+            Rounded::Refused => {
+                self.dropped += 1;
+                None
+            }
+        }
+    }
+
+    /// Those of both.
+    pub fn add(&mut self, other: Self) {
+        self.dropped += other.dropped;
+        self.cut += other.cut;
+    }
+}
+
 impl Exact {
     /// Nothing.
     pub const ZERO: Self = Self([0; 3]);

@@ -313,10 +313,10 @@ fn sinc(x: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn all() -> Vec<FilterDescription> {
+    pub(in crate::film) fn all() -> Vec<FilterDescription> {
         use FilterDescription::*;
         let third = 1.0 / 3.0;
         vec![
@@ -357,7 +357,7 @@ mod tests {
     }
 
     /// `∫_{edge}^{∞} h / ∫h`, what a pixel at 0 sees of a half plane, by the midpoint rule.
-    fn footprint(f: &Filter, edge: f64) -> f64 {
+    pub(in crate::film) fn footprint(f: &Filter, edge: f64) -> f64 {
         const N: usize = 400_000;
         let r = f64::from(f.radius());
         let (mut all, mut part) = (0.0, 0.0);

@@ -16,7 +16,7 @@
 //! Weights are integers, too, and multiply integers, so that layers and films still add up bit for bit.
 
 use super::accumulator::TileBuffer;
-use super::exact::{CONTRIBUTION_BITS, Exact, Rounded};
+use super::exact::{CONTRIBUTION_BITS, Exact, Losses, Rounded};
 use super::filter::{Filter, MAX_SUPPORT};
 use super::layout::{Layout, Rect, TILE};
 use glam::Vec2;
@@ -37,7 +37,7 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Of values times `scale` at whole numbers from `first` on; `sum` is what they sum to exactly, if that matters.
+    /// Of values times `scale` at whole numbers from `first` on; with `keep_sum` rounding leaves their sum alone.
     pub(super) fn new(first: i32, values: &[f32], scale: f32, keep_sum: bool) -> Self {
         let mut weights = [0; MAX_SUPPORT];
         let (mut sum, mut given) = (0.0, 0);
@@ -94,16 +94,15 @@ impl Window {
     /// A tile, and what lies beyond it within `reach` pixels where it is at the border of the film: tiles share all
     /// pixels from which the film takes something among them.
     fn share_of(layout: Layout, rect: Rect, reach: i32) -> Self {
-        let around = Self::around(rect, reach);
-        let (low, high) = (|at: u32| if at == 0 { 0 } else { reach }, |end: bool| if end { 0 } else { reach });
-        let (left, upper) = (low(rect.x), low(rect.y));
-        let right = high(rect.x + rect.width == layout.width);
-        let lower = high(rect.y + rect.height == layout.height);
+        let beyond = |at_border: bool| if at_border { reach } else { 0 };
+        let (left, upper) = (beyond(rect.x == 0), beyond(rect.y == 0));
+        let right = beyond(rect.x + rect.width == layout.width);
+        let lower = beyond(rect.y + rect.height == layout.height);
         Self {
-            x: around.x + left,
-            y: around.y + upper,
-            width: around.width - left - right,
-            height: around.height - upper - lower,
+            x: rect.x as i32 - left,
+            y: rect.y as i32 - upper,
+            width: left + rect.width as i32 + right,
+            height: upper + rect.height as i32 + lower,
         }
     }
 
@@ -195,37 +194,26 @@ pub struct Patch {
     window: Window,
     cells: Vec<Exact>,
     exponent: i32,
-    dropped: u64,
-    cut: u64,
+    losses: Losses,
 }
 
-/// A contribution on the coarser grid of films with this exponent; `None` and counted where it is not finite.
+/// A contribution on the coarser grid of films with this exponent.
 #[inline]
-fn coarse(value: [f32; 3], exponent: i32, dropped: &mut u64, cut: &mut u64) -> Option<Exact> {
-    match Exact::round_below(value, exponent + COARSER, CONTRIBUTION_BITS - COARSER) {
-        Rounded::Held(x) => Some(x),
-        Rounded::Cut(x) => {
-            *cut += 1;
-            Some(x)
-        }
-        Rounded::Refused => {
-            *dropped += 1;
-            None
-        }
-    }
+fn coarse(value: [f32; 3], exponent: i32) -> Rounded {
+    Exact::round_below(value, exponent + COARSER, CONTRIBUTION_BITS - COARSER)
 }
 
 impl Patch {
     /// Empty, for films with this exponent.
     pub fn new(window: Window, exponent: i32) -> Self {
-        Self { window, cells: vec![Exact::ZERO; (window.width * window.height) as usize], exponent, dropped: 0, cut: 0 }
+        Self { window, cells: vec![Exact::ZERO; (window.width * window.height) as usize], exponent, losses: Losses::default() }
     }
 
     /// Adds one contribution (linear sRGB) of the walk of a pixel, if that is in the window.
     #[inline]
     pub fn add(&mut self, (x, y): (i32, i32), value: [f32; 3]) {
         if let Some(i) = self.window.index(x, y)
-            && let Some(v) = coarse(value, self.exponent, &mut self.dropped, &mut self.cut)
+            && let Some(v) = self.losses.hold(coarse(value, self.exponent))
         {
             self.cells[i].add(v);
         }
@@ -246,7 +234,7 @@ impl Patch {
 
     /// Tells `buffer` how many contributions were dropped or cut so far.
     pub fn count(&self, buffer: &mut TileBuffer) {
-        buffer.count(self.dropped, self.cut);
+        buffer.count(self.losses);
     }
 
     /// The grid's exponent.
@@ -298,10 +286,10 @@ impl Dealt {
     /// Adds its parts to the pixels of the tile.
     #[inline]
     pub fn add(&self, value: [f32; 3], rect: Rect, buffer: &mut TileBuffer) {
-        let (mut dropped, mut cut) = (0, 0);
-        let value = coarse(value, buffer.exponent(), &mut dropped, &mut cut);
+        let mut losses = Losses::default();
+        let value = losses.hold(coarse(value, buffer.exponent()));
         if self.counts {
-            buffer.count(dropped, cut);
+            buffer.count(losses);
         }
         let Some(value) = value else { return };
         for (y, w_y) in self.rows.each().filter(|(y, _)| (0..rect.height as i32).contains(y)) {
@@ -316,29 +304,14 @@ impl Dealt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::describe::FilterDescription::{self, CatmullRom, Gaussian, Lanczos, Mitchell, Tent};
+    use crate::describe::FilterDescription::{self, Box, Gaussian, Tent};
+    use crate::film::filter::tests::{all, footprint};
 
     fn wide() -> Vec<FilterDescription> {
-        let third = 1.0 / 3.0;
-        vec![
-            Tent { radius: 1.0 },
-            Gaussian { stddev: 0.5 },
-            Mitchell { b: third, c: third },
-            CatmullRom,
-            Lanczos { lobes: 3 },
-            Gaussian { stddev: 1.7 },
-        ]
+        all().into_iter().filter(|d| *d != Box).chain([Gaussian { stddev: 1.7 }]).collect()
     }
 
     const ONE: f64 = (1 << WEIGHT_BITS) as f64;
-
-    /// `∫_{edge}^{∞} h / ∫h` by the midpoint rule.
-    fn footprint(f: &Filter, edge: f64) -> f64 {
-        let r = f64::from(f.radius());
-        let at = |i: u32| r * (2.0 * (f64::from(i) + 0.5) / 400_000.0 - 1.0);
-        let h = |from: f64| (0..400_000).map(at).filter(|x| *x > from).map(|x| f64::from(f.eval(x as f32))).sum::<f64>();
-        h(edge) / h(-r)
-    }
 
     /// Walks that pixels share and splats that are dealt out see the profile of an edge that the filter has.
     #[test]

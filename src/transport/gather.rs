@@ -195,7 +195,7 @@ fn hit<R: Record, O: Observe>(
     }
     let length = walk.length + 1;
     let weight = if length == 1 {
-        if lamp::is_splatted(cx, walk.from, point, d, area_density(cx, point, d, arrival.inv_d2)) {
+        if lamp::is_splatted(cx, walk.from, point, d) {
             return;
         }
         1.0
@@ -220,12 +220,6 @@ fn hit<R: Record, O: Observe>(
     arrived_on_light(cx, (walk.class, walk.first_delta, walk.delta), length, point, (value, weight), tally);
 }
 
-/// Steradians at the lens, per m² at a light point on which `d` arrives; one where it is a direction itself.
-#[inline]
-fn area_density(cx: Context<'_>, point: &EmitterPoint, d: Vec3, inv_d2: f32) -> f32 {
-    if cx.scene.lights.is_infinite(point.emitter) { 1.0 } else { point.n_g.dot(d).abs() * inv_d2 }
-}
-
 /// A chain of Dirac events arrived on a light: no other join makes its path.
 pub(super) fn chain_hit<R: Record, O: Observe>(
     cx: Context<'_>,
@@ -238,12 +232,8 @@ pub(super) fn chain_hit<R: Record, O: Observe>(
     if radiance.is_black() || !cx.plan.wants_length(length) {
         return;
     }
-    if length == 1 {
-        let inv_d2 = if cx.scene.lights.is_infinite(point.emitter) { 1.0 } else { (point.y - lens).length_squared().recip() };
-        let d = branch.ray.d;
-        if lamp::is_splatted(cx, lens, point, d, area_density(cx, point, d, inv_d2)) {
-            return;
-        }
+    if length == 1 && lamp::is_splatted(cx, lens, point, branch.ray.d) {
+        return;
     }
     let value = branch.throughput * radiance * cx.chain_part;
     arrived_on_light(cx, (branch.class, branch.first_delta, branch.last_delta), length, point, (value, 1.0), tally);

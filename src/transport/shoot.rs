@@ -13,7 +13,7 @@ use super::{Contribution, Record, Technique};
 use crate::local::Equation;
 use crate::math::Random;
 use crate::scene::EmitterId;
-use crate::scene::emitter::{Emission, EmitterPoint};
+use crate::scene::emitter::Emission;
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::scene::sensor::SensorConnection;
 use crate::spectrum::Spectrum;
@@ -180,32 +180,12 @@ fn splat<R: Record, O: Observe>(
         light_delta: start.delta,
     };
     let lens = vertex.surface.p + c.w / c.inv_d2.sqrt();
-    hand_on(cx, path, c, (value, weight, start.point.emitter), lens, random, tally);
-}
-
-/// Hands on a lamp that the lens sees directly, if it counts.
-#[inline]
-pub(super) fn finish<R: Record, O: Observe>(
-    cx: Context<'_>,
-    c: SensorConnection,
-    (value, point): (Spectrum, &EmitterPoint),
-    random: &mut Random,
-    tally: &mut Tally<'_, R, O>,
-) {
-    let path = Finished {
-        from_eye: cx.plan.settings.paths.eye(),
-        from_light: cx.plan.settings.paths.light(),
-        length: 1,
-        first_delta: false,
-        last_delta: false,
-        light_delta: false,
-    };
-    hand_on(cx, path, c, (value, 1.0, point.emitter), c.end, random, tally);
+    finish(cx, path, c, (value, weight, start.point.emitter), lens, random, tally);
 }
 
 /// Hands on a finished path if it counts.
 #[inline]
-fn hand_on<R: Record, O: Observe>(
+pub(super) fn finish<R: Record, O: Observe>(
     cx: Context<'_>,
     path: Finished,
     c: SensorConnection,

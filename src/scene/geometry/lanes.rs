@@ -44,8 +44,6 @@ pub(super) trait Lanes: Copy {
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Lane k in bit k.
     fn bits(m: Self::Mask) -> u32;
-    /// Asks for the cache lines of `x` ahead of use; `LINES` of 64 bytes.
-    fn prefetch<const LINES: usize, T>(x: *const T);
     /// Traverses the subtree of an instance, whose ray is in the coordinates of its group.
     fn enter<const ANY: bool>(tree: &Tree, root: u32, ray: &Ray) -> Hit;
 }
@@ -152,9 +150,6 @@ impl Lanes for Portable {
     fn bits(m: u32) -> u32 {
         m
     }
-
-    #[inline(always)]
-    fn prefetch<const LINES: usize, T>(_: *const T) {}
 
     fn enter<const ANY: bool>(tree: &Tree, root: u32, ray: &Ray) -> Hit {
         super::traverse::traverse::<Self, ANY, false>(tree, root, ray)

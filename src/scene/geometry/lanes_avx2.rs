@@ -133,13 +133,6 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn prefetch<const LINES: usize, T>(x: *const T) {
-        for line in 0..LINES {
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(x.cast::<i8>().wrapping_add(64 * line)) };
-        }
-    }
-
-    #[inline(always)]
     fn enter<const ANY: bool>(tree: &Tree, root: u32, ray: &Ray) -> Hit {
         unsafe { traverse_group::<ANY>(tree, root, ray) }
     }

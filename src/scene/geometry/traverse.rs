@@ -14,6 +14,7 @@
 use super::lanes::Lanes;
 use super::ray::{Hit, NONE, Ray};
 use super::tree::{ANALYTIC, Block, INSTANCE, KIND, LEAF, Node, STACK, TRIANGLES, Tree};
+use crate::math::prefetch;
 use glam::Vec3;
 use std::mem::MaybeUninit;
 
@@ -262,7 +263,7 @@ pub(super) fn traverse<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, 
                     code = node.child[(mask.trailing_zeros() & 7) as usize];
                     continue;
                 }
-                ask_for_children::<L>(tree, node, mask);
+                ask_for_children(tree, node, mask);
                 code = order(&mut stack, node, mask, &enter.store());
             }
             if code & KIND == TRIANGLES {
@@ -272,7 +273,7 @@ pub(super) fn traverse<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, 
                 meet_block(block, &wide, t_far, &mut hit);
                 // Whoever asks for the nearest hit looks at its primitive next.
                 if !ANY && hit.prim != before {
-                    L::prefetch::<1, _>(tree.prims.as_ptr().wrapping_add(hit.prim as usize));
+                    prefetch(tree.prims.as_ptr().wrapping_add(hit.prim as usize));
                 }
             } else {
                 let other = meet_other::<L, ANY, TOP>(tree, code, ray, hit.t);
@@ -297,14 +298,14 @@ pub(super) fn traverse<L: Lanes, const ANY: bool, const TOP: bool>(tree: &Tree, 
 
 /// Fetches the children of `mask` while they are being sorted.
 #[inline(always)]
-fn ask_for_children<L: Lanes>(tree: &Tree, node: &Node, mut mask: u32) {
+fn ask_for_children(tree: &Tree, node: &Node, mut mask: u32) {
     while mask != 0 {
         let code = node.child[(mask.trailing_zeros() & 7) as usize];
         mask &= mask - 1;
         if code & LEAF == 0 {
-            L::prefetch::<4, _>(tree.nodes.as_ptr().wrapping_add(code as usize));
+            prefetch(tree.nodes.as_ptr().wrapping_add(code as usize));
         } else {
-            L::prefetch::<5, _>(tree.blocks.as_ptr().wrapping_add((code & !(LEAF | KIND)) as usize));
+            prefetch(tree.blocks.as_ptr().wrapping_add((code & !(LEAF | KIND)) as usize));
         }
     }
 }
