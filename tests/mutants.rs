@@ -35,9 +35,11 @@ struct Check {
     paths: &'static str,
     a: (&'static str, u32),
     b: (&'static str, u32),
+    /// Gathering of the second is led to the light.
+    led: bool,
 }
 
-const CHECKS: [Check; 7] = [
+const CHECKS: [Check; 8] = [
     Check {
         mutant: Mutant::AdjointShadingNormal,
         named: "agreement::shading_normals::joins",
@@ -45,6 +47,7 @@ const CHECKS: [Check; 7] = [
         paths: "E (D | D .* D) L",
         a: ("nee", 3),
         b: ("splat", 3),
+        led: false,
     },
     Check {
         mutant: Mutant::RefractionEtaSquared,
@@ -53,6 +56,7 @@ const CHECKS: [Check; 7] = [
         paths: "E D .* L",
         a: ("hit", 3),
         b: ("splat", 3),
+        led: false,
     },
     Check {
         mutant: Mutant::SplatCropNormalisation,
@@ -61,6 +65,7 @@ const CHECKS: [Check; 7] = [
         paths: "E (D | D .* D) L",
         a: ("nee", 3),
         b: ("splat", 3),
+        led: false,
     },
     Check {
         mutant: Mutant::NextEventDensity,
@@ -69,6 +74,7 @@ const CHECKS: [Check; 7] = [
         paths: "E .* D L",
         a: ("hit", 3),
         b: ("nee", 3),
+        led: false,
     },
     Check {
         mutant: Mutant::RouletteFactor,
@@ -77,6 +83,7 @@ const CHECKS: [Check; 7] = [
         paths: "E .* D L",
         a: ("nee", 2),
         b: ("nee", 100),
+        led: false,
     },
     Check {
         mutant: Mutant::AreaCosine,
@@ -85,6 +92,7 @@ const CHECKS: [Check; 7] = [
         paths: "visible-to:gather",
         a: ("nee", 3),
         b: ("hit,nee,splat,connect", 3),
+        led: false,
     },
     Check {
         mutant: Mutant::MergeWeight,
@@ -93,6 +101,16 @@ const CHECKS: [Check; 7] = [
         paths: "E .* S D S+ L",
         a: ("hit", 3),
         b: ("hit,merge", 3),
+        led: false,
+    },
+    Check {
+        mutant: Mutant::LearnedDensity,
+        named: "led::led_walks_keep_every_expectation",
+        scene: "diffuse box",
+        paths: "visible-to:gather",
+        a: ("nee", 3),
+        b: ("hit,nee,splat,connect", 3),
+        led: true,
     },
 ];
 
@@ -101,7 +119,7 @@ fn p_of(check: &Check) -> f64 {
     let dir = tempfile::tempdir().unwrap();
     let world = scene(&scenes::named(dir.path(), check.scene));
     let effort = Effort { renders: 64, passes: 10, max_length: 5 };
-    let run = |(techniques, rr_depth): (&str, u32), seed: u64| {
+    let run = |(techniques, rr_depth): (&str, u32), guided_gathering, seed: u64| {
         let settings = Settings {
             techniques: Techniques::parse(techniques).unwrap(),
             paths: PathFilter::parse(check.paths).unwrap(),
@@ -109,12 +127,13 @@ fn p_of(check: &Check) -> f64 {
             rr_depth,
             connections: 2,
             merge_radius: Some(0.02),
+            guided_gathering,
             seed,
             ..Settings::default()
         };
         series(&world, &settings, effort)
     };
-    let (a, b) = (run(check.a, seed() * 77 + 1), run(check.b, seed() * 77 + 2));
+    let (a, b) = (run(check.a, false, seed() * 77 + 1), run(check.b, check.led, seed() * 77 + 2));
     (2..=5).map(|k| agreement(&a[k], &b[k]).p).fold(1.0, f64::min)
 }
 

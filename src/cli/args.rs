@@ -320,6 +320,9 @@ pub struct TransportArgs {
     /// Let light start as the lamps emit it, not where a pilot found that it matters
     #[arg(long)]
     pub no_guide: bool,
+    /// Let gathering walks go where a pilot found that light comes from; --estimator auto decides so where it pays
+    #[arg(long, conflicts_with = "no_guide")]
+    pub guide_gathering: bool,
     /// Let a walk through glass choose at random which way it looks for lamps, instead of following all
     #[arg(long)]
     pub no_branching: bool,

@@ -31,6 +31,9 @@ struct PlanFile {
     /// Of the paths between eye and lamp, per pixel and pass.
     #[serde(default = "one")]
     chain_samples: u32,
+    /// Gathering walks go where a pilot found that light comes from.
+    #[serde(default)]
+    guided_gathering: bool,
 }
 
 fn faint() -> f32 {
@@ -51,6 +54,7 @@ pub fn text(plan: &Plan) -> String {
         merge_radius: plan.merge_radius,
         faint_branches: s.faint,
         chain_samples: s.chain_samples,
+        guided_gathering: plan.incident.is_some(),
     };
     serde_json::to_string(&file).unwrap_or_default()
 }
@@ -86,6 +90,7 @@ pub fn read(path: &Path, settings: &mut Settings) -> Result<bool, Failure> {
     settings.merge_radius = Some(file.merge_radius);
     settings.faint = file.faint_branches;
     settings.chain_samples = file.chain_samples;
+    settings.guided_gathering = file.guided_gathering;
     settings.automatic = false;
     Ok(true)
 }

@@ -154,6 +154,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     s.light_paths = t.light_paths;
     s.connections = t.connections;
     s.guided = !t.no_guide;
+    s.guided_gathering = t.guide_gathering;
     s.faint = if t.no_branching { NO_BRANCHES } else { FAINT };
     s.stratified = t.sampler == SamplerName::Stratified;
     s.seed = args.seed.unwrap_or(opened.scene.seed);
@@ -248,7 +249,9 @@ impl Job<'_> {
     /// What a pilot chose.
     fn choice(&self, plan: &Plan, pilot: Duration) -> String {
         let joins = plan.settings.techniques.names();
-        format!("chosen in {}: {joins}; {} light paths per pass\n", show_duration(pilot), show_count(f64::from(plan.light_paths)))
+        let led = if plan.incident.is_some() { "; gathering is led to the light" } else { "" };
+        let paths = show_count(f64::from(plan.light_paths));
+        format!("chosen in {}: {joins}; {paths} light paths per pass{led}\n", show_duration(pilot))
     }
 
     fn run(&mut self, scene: &Scene) -> Result<Exit, Failure> {
@@ -392,6 +395,8 @@ impl Job<'_> {
             "connections": set.connections,
             "merge_radius": render.plan().merge_radius,
             "guided": set.guided,
+            "guided_gathering": render.plan().incident.is_some(),
+            "survival": set.survival,
             "faint_branches": set.faint,
             "chain_samples": 1 + render.plan().more_chains(),
             "stratified": set.stratified,

@@ -15,6 +15,9 @@ use glam::Vec2;
 /// Roughness below which a model without a diffuse part scatters into few directions.
 const FOCUSED: f32 = 0.1;
 
+/// Roughness from which a model scatters so widely that it matters less than where light comes from.
+const WIDE: f32 = 0.3;
+
 /// Index of a built local model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaterialId(pub u32);
@@ -79,6 +82,7 @@ struct Summary {
     lobes: Lobes,
     anisotropic: bool,
     focused: bool,
+    guided: bool,
     albedo_bound: Spectrum,
 }
 
@@ -116,6 +120,7 @@ impl Materials {
             lobes: models().fold(Lobes::default(), |all, m| all.union(m.lobes())),
             anisotropic: models().any(Model::is_anisotropic),
             focused: models().all(|m| is_focused(m, textures)),
+            guided: models().any(|m| is_wide(m, textures)) && !models().any(|m| m.lobes().glossy_refraction),
             albedo_bound: models().fold(Spectrum::BLACK, |most, m| most.lane_max(m.albedo_bound(textures))),
         });
         self.sides.extend([front, back]);
@@ -160,6 +165,13 @@ impl Materials {
         self.summaries[id.0 as usize].focused
     }
 
+    /// Scatters widely, and on the side that light comes from: gathering walks may go where light is known to come from. One
+    /// answer for the whole material, like [`Self::is_focused`].
+    #[inline]
+    pub fn is_guided(&self, id: MaterialId) -> bool {
+        self.summaries[id.0 as usize].guided
+    }
+
     /// Kinds of events on either side.
     pub fn lobes(&self, id: MaterialId) -> Lobes {
         self.summaries[id.0 as usize].lobes
@@ -186,6 +198,12 @@ impl Materials {
 fn is_focused(model: &Model, textures: &Textures) -> bool {
     let spread = model.lobes().diffuse || model.is_anisotropic();
     !spread && model.resolve(textures, Vec2::splat(0.5)).roughness() < FOCUSED
+}
+
+/// Told in the middle of textures.
+fn is_wide(model: &Model, textures: &Textures) -> bool {
+    let lobes = model.lobes();
+    lobes.diffuse || (lobes.glossy && model.resolve(textures, Vec2::splat(0.5)).roughness() >= WIDE)
 }
 
 impl Side {

@@ -7,6 +7,8 @@ use crate::transport::settings::{Coupling, Settings, Techniques};
 
 /// Longest path of recursive ray tracing, unless somebody says.
 const RECURSION: u32 = 16;
+/// [`Settings::survival`] of `auto`: on ten scenes up to a third less error than with 1, for at most a tenth more time.
+const SURVIVAL: f32 = 4.0;
 
 /// How the measurement is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -113,6 +115,7 @@ impl Options {
             max_length: i.max_depth.unwrap_or(u32::MAX).min(estimator.longest()),
             automatic: estimator == Estimator::Auto,
             rr_depth: i.rr_depth,
+            survival: if estimator == Estimator::Auto { SURVIVAL } else { 1.0 },
             hide_emitters: i.hide_emitters,
             ..Settings::default()
         };
@@ -126,12 +129,14 @@ impl Options {
         let mut h = blake3::Hasher::new();
         h.update(&scene.hash());
         h.update(&[t.hit, t.next_event, t.splat, t.connect, t.merge].map(u8::from));
-        let switches = [s.heuristic == Heuristic::Power, s.hide_emitters, s.guided, s.automatic, s.stratified];
+        let switches =
+            [s.heuristic == Heuristic::Power, s.hide_emitters, s.guided, s.guided_gathering, s.automatic, s.stratified];
         h.update(&switches.map(u8::from));
         h.update(format!("{:?}", s.coupling).as_bytes());
         for n in [s.min_length, s.max_length, s.rr_depth, s.connections] {
             h.update(&n.to_le_bytes());
         }
+        h.update(&s.survival.to_le_bytes());
         h.update(&s.faint.to_le_bytes());
         h.update(&s.chain_samples.to_le_bytes());
         h.update(&s.merge_radius.map_or(u32::MAX, f32::to_bits).to_le_bytes());

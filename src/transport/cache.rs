@@ -15,6 +15,8 @@ pub struct LightVertex {
     pub surface: Surface,
     /// Unit direction to its predecessor (towards the light).
     pub w_back: Vec3,
+    /// Density with which gathering would take that direction as a learned one, where something was learned.
+    pub learned_back: Option<f32>,
     /// Flux arriving per light path, over its density.
     pub throughput: Spectrum,
     /// MIS sum on arrival.

@@ -60,6 +60,7 @@ pub fn follow<R: Record, O: Observe>(
     let p_sensor = scene.sensor.density(start.d);
     let mut walk = Walk {
         throughput: Spectrum::ONE * weight,
+        guided: 1.0,
         k: 0.0,
         p: if p_sensor > 0.0 { p_sensor } else { 1.0 },
         delta: false,
@@ -92,7 +93,7 @@ pub fn follow<R: Record, O: Observe>(
             return;
         }
         tally.observe.arrived(&surface);
-        let vertex = Vertex::new(scene, surface, -ray.d);
+        let vertex = Vertex::gathering(scene, plan.incident(), surface, -ray.d);
         let count = if walk.length == 0 {
             plan.n
         } else if walk.delta {
@@ -123,7 +124,7 @@ pub fn follow<R: Record, O: Observe>(
         tally.observe.scattered(&s);
         walk.leave(cx, &vertex, arrival, partial, &s);
         walk.classify(&plan.settings.paths, EQUATION, s.delta);
-        if !walk.survives(plan, 1.0, random) {
+        if !walk.survives(plan, 1.0 / plan.settings.survival, random) {
             return;
         }
         ray = spawn(&vertex.surface, s.w_next);
@@ -360,7 +361,7 @@ fn connect<R: Record, O: Observe>(
         }
         let w = d / d2.sqrt();
         let Some(k_eye) = vertex.kernel(EQUATION, w) else { continue };
-        let light = Vertex::new(scene, y.surface, y.w_back);
+        let light = Vertex::new(scene, y.surface, y.w_back).with_learned_back(y.learned_back);
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
         // A merge at either end exists only where the other end is focused.

@@ -17,6 +17,7 @@
 //! - `lamp`: paths without a vertex between, lamps seen directly.
 //! - [`recursive`]: part of the coupling, or none: recursive ray tracing, local illumination.
 //! - [`chain`], [`branch`]: Dirac events followed in all directions, beside a gathering walk.
+//! - [`incident`]: where light comes from, as learned, for gathering walks to go there.
 //! - [`cache`], [`merge`]: light vertices kept for connections and merges.
 //! - [`mod@reference`]: the same weights the slow way, for tests.
 
@@ -25,6 +26,7 @@ pub mod cache;
 pub mod chain;
 pub mod class;
 pub mod gather;
+pub mod incident;
 mod lamp;
 pub mod merge;
 pub mod mis;

@@ -28,6 +28,8 @@ pub enum Mutant {
     ChainPart = 10,
     /// A hit counts a lamp that a splat counts as well.
     LampTwice = 11,
+    /// The shooting walker does not know that gathering goes where light comes from.
+    LearnedDensity = 12,
 }
 
 #[cfg(feature = "mutants")]

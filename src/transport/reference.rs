@@ -22,7 +22,7 @@ use std::sync::Arc;
 /// A Dirac event in the middle of a path.
 #[derive(Clone, Copy, Debug)]
 pub struct DiracEvent {
-    /// Probability of the lobe for the gathering walker.
+    /// Probability of the lobe for the gathering walker, given that it goes by the local model.
     pub prob_gather: f64,
     /// Probability of the lobe for the shooting walker.
     pub prob_shoot: f64,
@@ -96,15 +96,14 @@ impl Path {
             let w_eye = if i == 0 { -w } else { (self.vertices[i - 1].surface.p - p).normalize() };
             let w_light = if i + 1 == m { to_light } else { (self.vertices[i + 1].surface.p - p).normalize() };
             let (p_gather, p_shoot) = match v.dirac {
-                Some(e) => (e.prob_gather, e.prob_shoot * e.ratio),
+                Some(e) => {
+                    let by_model = Vertex::gathering(scene, plan.incident(), v.surface, w_eye).by_model();
+                    (e.prob_gather * f64::from(by_model), e.prob_shoot * e.ratio)
+                }
                 None => {
-                    let from_eye = Vertex::new(scene, v.surface, w_eye);
+                    let from_eye = Vertex::gathering(scene, plan.incident(), v.surface, w_eye);
                     let from_light = Vertex::new(scene, v.surface, w_light);
-                    let to_local = |w: Vec3| from_eye.frame.to_local(w);
-                    (
-                        f64::from(from_eye.closure.density(to_local(w_eye), to_local(w_light))),
-                        f64::from(from_light.closure.density(to_local(w_light), to_local(w_eye))),
-                    )
+                    (f64::from(from_eye.density(w_light)), f64::from(from_light.density(w_eye)))
                 }
             };
             d.delta[i + 1] = v.dirac.is_some();
@@ -375,10 +374,11 @@ impl Observe for Witness {
     fn scattered(&mut self, s: &Scatter) {
         if let (true, Some(v)) = (s.delta, self.vertices.last_mut()) {
             let (p, rev, ratio) = (f64::from(s.p), f64::from(s.p_rev), f64::from(s.dirac_ratio));
+            let by_model = f64::from(s.by_model);
             v.dirac = Some(if self.shooting {
-                DiracEvent { prob_gather: rev, prob_shoot: p, ratio: 1.0 / ratio }
+                DiracEvent { prob_gather: rev / by_model, prob_shoot: p, ratio: 1.0 / ratio }
             } else {
-                DiracEvent { prob_gather: p, prob_shoot: rev, ratio }
+                DiracEvent { prob_gather: p / by_model, prob_shoot: rev, ratio }
             });
         }
     }

@@ -2,9 +2,11 @@
 
 use super::Technique;
 use super::class::PathFilter;
+use super::incident::Incident;
 use super::mis::Heuristic;
 use super::mutant::{Mutant, planted};
 use crate::scene::emitter::Guide;
+use std::sync::Arc;
 
 /// Joins that are allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,6 +117,9 @@ pub struct Settings {
     pub max_length: u32,
     /// Path length from which Russian roulette may end a walk.
     pub rr_depth: u32,
+    /// Roulette lets a gathering walk go on with so many times the share that it still carries, at most 0.95. With 1 those that
+    /// go on carry as much as at their start, and what they find late is noise.
+    pub survival: f32,
     /// Leave out paths of length 1.
     pub hide_emitters: bool,
     /// Light paths per pass; `None` = one per pixel.
@@ -127,6 +132,8 @@ pub struct Settings {
     pub automatic: bool,
     /// Light paths start where a pilot found that they matter.
     pub guided: bool,
+    /// Gathering walks go where a pilot found that light comes from; where techniques are chosen, the pilot may decide so.
+    pub guided_gathering: bool,
     /// Branches of a chain of Dirac events from the eye to a light ([`super::chain`]) that carry less than this
     /// share of the pixel are followed with a probability only; [`NO_BRANCHES`]: a walk takes one way at random.
     pub faint: f32,
@@ -165,12 +172,14 @@ impl Default for Settings {
             min_length: 1,
             max_length: u32::MAX,
             rr_depth: 5,
+            survival: 1.0,
             hide_emitters: false,
             light_paths: None,
             connections: 1,
             merge_radius: None,
             automatic: false,
             guided: true,
+            guided_gathering: false,
             faint: FAINT,
             chain_samples: 1,
             paths: PathFilter::default(),
@@ -205,6 +214,8 @@ pub struct Plan {
     pub inv_light_paths: f32,
     /// Learned densities of emission.
     pub guide: Guide,
+    /// Learned densities of gathering.
+    pub incident: Option<Arc<Incident>>,
 }
 
 /// Longest path that is ever walked: roulette ends walks long before, except where it is off.
@@ -236,8 +247,15 @@ impl Plan {
             splat_direct: t.splat && !t.next_event,
             inv_light_paths: if light_paths > 0 { 1.0 / normaliser as f32 } else { 0.0 },
             guide: Guide::default(),
+            incident: None,
             settings,
         }
+    }
+
+    /// Learned densities of gathering.
+    #[inline]
+    pub fn incident(&self) -> Option<&Incident> {
+        self.incident.as_deref()
     }
 
     /// Radius in which pass `pass` merges: its square falls with the cube root of the number of the pass,

@@ -60,6 +60,7 @@ pub fn emit<R: Record, O: Observe>(
     let cos_from = if start.infinite || start.delta { 1.0 } else { start.point.n_g.dot(start.w).abs() };
     let mut walk = Walk {
         throughput: start.weight,
+        guided: 1.0,
         k: if hits { 1.0 / h.raise(d.p_k) } else { 0.0 },
         p: d.p_next,
         delta: false,
@@ -84,7 +85,7 @@ pub fn emit<R: Record, O: Observe>(
         let length = walk.length + 1;
         let arrival = walk.arrive(&surface, ray.d);
         tally.observe.arrived(&surface);
-        let vertex = Vertex::new(scene, surface, -ray.d);
+        let vertex = Vertex::shooting(scene, plan.incident(), surface, -ray.d);
         let count = if walk.length == 0 {
             if plan.settings.techniques.next_event {
                 scene.lights.density_next_event(&scene.geometry, surface.p, &start.point, -ray.d) / d.p_k
@@ -109,6 +110,7 @@ pub fn emit<R: Record, O: Observe>(
                 cache.push(LightVertex {
                     surface,
                     w_back: vertex.w_back,
+                    learned_back: vertex.learned_back(),
                     throughput: walk.throughput,
                     partial,
                     length,

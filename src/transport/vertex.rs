@@ -9,9 +9,11 @@
 //! adjoint correction of shading normals [Veach 1997, p. 155]. A pair of directions on which shading
 //! and geometric normal disagree about the side scatters nothing, for both walkers alike.
 
+use super::incident::{Incident, LEARNED, Lobes};
 use super::mutant::{Mutant, planted};
 use crate::local::{Closure, Equation, Sample};
 use crate::math::Frame;
+use crate::math::warp::ONE_MINUS_EPSILON;
 use crate::scene::{Scene, Surface};
 use crate::spectrum::Spectrum;
 use glam::Vec3;
@@ -32,6 +34,18 @@ pub struct Vertex<'a> {
     pub cos_g_back: f32,
     /// All its events are [focused](crate::local::Materials::is_focused).
     pub focused: bool,
+    /// Where the gathering walker has learned that light comes from.
+    learned: Learned<'a>,
+}
+
+/// What is learned of the directions at a vertex, as far as a walker must know it.
+#[derive(Clone, Copy, Debug)]
+enum Learned<'a> {
+    Nothing,
+    /// All, for the gathering walker.
+    Directions(&'a Lobes),
+    /// The density of `w_back`, for the shooting walker.
+    Back(f32),
 }
 
 /// The kernel towards one direction, with what the weights need.
@@ -64,6 +78,10 @@ pub struct Scatter {
     pub delta: bool,
     /// That, or nearly so: the material is [focused](crate::local::Materials::is_focused).
     pub focused: bool,
+    /// Part of the directions here that gathering takes by the local model.
+    pub by_model: f32,
+    /// Density of the event relative to that by the local model alone: not 1 where gathering goes where light comes from.
+    pub guided: f32,
     /// Ratio of the Dirac functions, see [`crate::local::Sample::dirac_ratio`].
     pub dirac_ratio: f32,
     /// Refractive index on the side of `w_next` over that on the side of `w_back`.
@@ -82,7 +100,72 @@ impl<'a> Vertex<'a> {
         let back = frame.to_local(w_back);
         let closure = scene.materials.resolve(surface.material, surface.uv, back.z > 0.0);
         let focused = scene.materials.is_focused(surface.material);
-        Self { surface, frame, closure, w_back, back, cos_g_back: w_back.dot(surface.n_g), focused }
+        let cos_g_back = w_back.dot(surface.n_g);
+        Self { surface, frame, closure, w_back, back, cos_g_back, focused, learned: Learned::Nothing }
+    }
+
+    /// What `incident` knows of this point, if the material is one for which it matters.
+    #[inline]
+    fn directions<'i>(&self, scene: &Scene, incident: Option<&'i Incident>) -> Option<&'i Lobes> {
+        let incident = incident.filter(|_| scene.materials.is_guided(self.surface.material))?;
+        incident.at(self.surface.p, self.surface.n_g * self.cos_g_back.signum())
+    }
+
+    /// The same for a gathering walk, which goes where light comes from as far as `incident` knows.
+    #[inline]
+    pub fn gathering(scene: &'a Scene, incident: Option<&'a Incident>, surface: Surface, w_back: Vec3) -> Self {
+        let mut vertex = Self::new(scene, surface, w_back);
+        if let Some(directions) = vertex.directions(scene, incident) {
+            vertex.learned = Learned::Directions(directions);
+        }
+        vertex
+    }
+
+    /// The same for a shooting walk, which must know how a gathering walk would go.
+    #[inline]
+    pub fn shooting(scene: &'a Scene, incident: Option<&Incident>, surface: Surface, w_back: Vec3) -> Self {
+        let vertex = Self::new(scene, surface, w_back);
+        let back = vertex.directions(scene, incident).map(|d| d.density(w_back));
+        vertex.with_learned_back(back)
+    }
+
+    /// The density with which `w_back` would be taken as a learned direction, where something was learned.
+    #[inline]
+    pub fn learned_back(&self) -> Option<f32> {
+        if let Learned::Back(density) = self.learned { Some(density) } else { None }
+    }
+
+    /// With what [`Self::learned_back`] told.
+    #[inline]
+    pub fn with_learned_back(mut self, back: Option<f32>) -> Self {
+        self.learned = back.map_or(Learned::Nothing, Learned::Back);
+        self
+    }
+
+    /// Part of the directions that gathering takes by the local model.
+    #[inline]
+    pub fn by_model(&self) -> f32 {
+        if matches!(self.learned, Learned::Nothing) { 1.0 } else { 1.0 - LEARNED }
+    }
+
+    /// Density per steradian with which gathering takes a direction that the local model takes with density `p`:
+    /// `w_next` of a gathering walk, `w_back` of a shooting one.
+    #[inline]
+    fn gathers(&self, p: f32, w_next: Vec3) -> f32 {
+        let learned = match self.learned {
+            Learned::Nothing => return p,
+            Learned::Directions(d) => d.density(w_next),
+            Learned::Back(_) if planted(Mutant::LearnedDensity) => return p,
+            Learned::Back(density) => density,
+        };
+        (1.0 - LEARNED) * p + LEARNED * learned
+    }
+
+    /// Density per steradian of [`Self::scatter`] choosing the unit direction `w_next`, Dirac events apart.
+    #[inline]
+    pub fn density(&self, w_next: Vec3) -> f32 {
+        let p = self.closure.density(self.back, self.frame.to_local(w_next));
+        if matches!(self.learned, Learned::Back(_)) { p } else { self.gathers(p, w_next) }
     }
 
     /// Whether shading and geometric normal agree about the sides of both directions.
@@ -104,6 +187,18 @@ impl<'a> Vertex<'a> {
     /// The kernel towards unit `w_next`, `None` where it is zero. Non-Dirac part.
     #[inline]
     pub fn kernel(&self, equation: Equation, w_next: Vec3) -> Option<Kernel> {
+        let mut k = self.kernel_by_model(equation, w_next)?;
+        let of_gathering = match equation {
+            Equation::Rendering => &mut k.p_w,
+            Equation::Potential => &mut k.p_w_rev,
+        };
+        *of_gathering = self.gathers(*of_gathering, w_next);
+        Some(k)
+    }
+
+    /// The same with the densities of the local model alone.
+    #[inline]
+    fn kernel_by_model(&self, equation: Equation, w_next: Vec3) -> Option<Kernel> {
         let next = self.frame.to_local(w_next);
         let cos_g = w_next.dot(self.surface.n_g);
         if !self.sides_agree(next, cos_g) {
@@ -119,8 +214,46 @@ impl<'a> Vertex<'a> {
 
     /// Samples the next direction.
     #[inline]
-    pub fn scatter(&self, equation: Equation, u_lobe: f32, u: glam::Vec2) -> Option<Scatter> {
-        self.scattered(equation, self.closure.sample(equation, self.back, u_lobe, u)?)
+    pub fn scatter(&self, equation: Equation, mut u_lobe: f32, u: glam::Vec2) -> Option<Scatter> {
+        if let Learned::Directions(directions) = self.learned {
+            if u_lobe < LEARNED {
+                return self.scatter_learned(directions.sample(u));
+            }
+            u_lobe = ((u_lobe - LEARNED) / (1.0 - LEARNED)).min(ONE_MINUS_EPSILON);
+        }
+        let mut s = self.scattered(equation, self.closure.sample(equation, self.back, u_lobe, u)?)?;
+        let of_gathering = match equation {
+            Equation::Rendering => &mut s.p,
+            Equation::Potential => &mut s.p_rev,
+        };
+        let p = *of_gathering;
+        s.by_model = self.by_model();
+        *of_gathering = if s.delta { self.by_model() * p } else { self.gathers(p, s.w_next) };
+        if equation == Equation::Rendering && s.p != p {
+            s.guided = s.p / p;
+            s.weight /= s.guided;
+        }
+        Some(s)
+    }
+
+    /// A gathering walk goes on along a learned direction.
+    #[inline]
+    fn scatter_learned(&self, w_next: Vec3) -> Option<Scatter> {
+        let k = self.kernel_by_model(Equation::Rendering, w_next)?;
+        let p = self.gathers(k.p_w, w_next);
+        Some(Scatter {
+            w_next,
+            weight: k.value / p,
+            p,
+            p_rev: k.p_w_rev,
+            cos_g: k.cos_g,
+            delta: false,
+            focused: self.focused,
+            by_model: self.by_model(),
+            guided: if k.p_w > 0.0 { p / k.p_w } else { 1.0 },
+            dirac_ratio: 1.0,
+            eta: 1.0,
+        })
     }
 
     /// Every Dirac event, lobes that share a direction apart: its weight times its probability is its coefficient.
@@ -158,6 +291,8 @@ impl<'a> Vertex<'a> {
             cos_g: cos_g.abs(),
             delta: s.delta,
             focused: s.delta || self.focused,
+            by_model: 1.0,
+            guided: 1.0,
             dirac_ratio: s.dirac_ratio,
             eta: s.eta,
         })

@@ -54,6 +54,8 @@ impl<'a> Context<'a> {
 pub struct Walk {
     /// Product of kernels over densities, roulette included.
     pub throughput: Spectrum,
+    /// Density of the walk relative to one by local models alone: not 1 where gathering went where light comes from.
+    pub guided: f32,
     /// MIS sum of the vertex that was left, resolved for the direction taken (already raised).
     pub k: f32,
     /// Density per steradian of the direction taken (first edge: see the walkers), or the
@@ -139,6 +141,7 @@ impl Walk {
     pub fn leave(&mut self, cx: Context<'_>, vertex: &Vertex<'_>, arrival: Arrival, mut partial: Partial<f32>, s: &Scatter) {
         let h = cx.plan.settings.heuristic;
         self.throughput *= s.weight;
+        self.guided *= s.guided;
         self.k = if s.delta {
             // Where all events are focused, it was added on arrival.
             if !vertex.focused {
@@ -175,7 +178,9 @@ impl Walk {
     }
 
     /// Russian roulette on the throughput relative to `start`; false ends the walk. Survival
-    /// probabilities depend on the history of the walk, so they stay out of the MIS densities.
+    /// probabilities depend on the history of the walk, so they stay out of the MIS densities. A walk that was led to the light
+    /// carries little because it is found often, not because it matters little: what counts is what it would carry
+    /// had local models led it.
     #[inline]
     pub fn survives(&mut self, plan: &Plan, start: f32, random: &mut Random) -> bool {
         let t = self.throughput.max_lane();
@@ -185,7 +190,7 @@ impl Walk {
         if self.length < plan.settings.rr_depth {
             return true;
         }
-        let q = (t * self.eta * self.eta / start).min(0.95);
+        let q = (t * self.guided * self.eta * self.eta / start).min(0.95);
         if random.unit() >= q {
             return false;
         }

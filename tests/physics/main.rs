@@ -7,6 +7,7 @@ mod choice;
 mod determinism;
 mod furnace;
 mod lamps;
+mod led;
 mod lights;
 mod merging;
 mod mirrors;

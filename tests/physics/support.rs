@@ -29,11 +29,21 @@ pub fn scene(xml: &str) -> Scene {
     nephroid::load_str(xml, std::path::Path::new("."), &Default::default()).map(|l| l.scene).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Where light starts, as a bidirectional render would learn it: a good start for every join.
-pub fn learned(scene: &Scene, settings: &Settings) -> Guide {
+/// The plan with what a bidirectional render would learn, a good start for every join: where light starts, and where
+/// gathering goes.
+pub fn with_lessons(scene: &Scene, settings: &Settings, plan: Plan) -> Plan {
+    if !settings.guided && !settings.guided_gathering {
+        return plan;
+    }
+    let learned = learned(scene, settings);
+    let guide = if settings.guided { learned.guide } else { Guide::default() };
+    Plan { guide, incident: learned.incident, ..plan }
+}
+
+fn learned(scene: &Scene, settings: &Settings) -> Plan {
     let settings = Settings { techniques: Techniques::BIDIRECTIONAL, paths: PathFilter::default(), ..settings.clone() };
     let options = Options { settings, ..Options::default() };
-    Render::new(scene, &options).expect("a film").plan().guide.clone()
+    Render::new(scene, &options).expect("a film").plan().clone()
 }
 
 /// Sums of one render by path length and block.
@@ -88,8 +98,8 @@ pub fn series(scene: &Scene, settings: &Settings, effort: Effort) -> Vec<BlockSe
     let mut settings = settings.clone();
     settings.max_length = settings.max_length.min(effort.max_length);
     // Any constant is a valid number of vertices for the weights.
-    let guide = if settings.guided { learned(scene, &settings) } else { Guide::default() };
-    let plan = Plan { guide, ..Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0) };
+    let plan = Plan::new(&settings, crop[2] * crop[3], film.width * film.height, 2.0);
+    let plan = with_lessons(scene, &settings, plan);
     let renders: Vec<Blocks> = (0..effort.renders)
         .into_par_iter()
         .map(|render| {

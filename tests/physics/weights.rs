@@ -1,11 +1,10 @@
 //! MIS weights: the recursion against the definition, on random numbers and on the walks' own paths.
 
 use crate::scenes;
-use crate::support::{learned, scene, seed};
+use crate::support::{scene, seed, with_lessons};
 use glam::{Vec2, Vec3};
 use nephroid::math::Random;
 use nephroid::math::random::Family;
-use nephroid::scene::emitter::Guide;
 use nephroid::transport::cache::LightCache;
 use nephroid::transport::gather::gather;
 use nephroid::transport::mis::Heuristic;
@@ -70,8 +69,7 @@ fn recursion_is_the_definition_for_100_000_random_paths() {
 fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scene::Scene, Plan, Vec<Testimony>) {
     let world = scene(xml);
     let film = world.film.clone();
-    let guide = if settings.guided { learned(&world, settings) } else { Guide::default() };
-    let plan = Plan { guide, ..Plan::new(settings, 64, film.width * film.height, 2.0) };
+    let plan = with_lessons(&world, settings, Plan::new(settings, 64, film.width * film.height, 2.0));
     // One pass for all, so that one η belongs to all weights.
     let cx = Context::new(&world, &plan, 0);
     let (mut witness, mut rays) = (Witness::default(), RayCounts::default());
@@ -185,6 +183,13 @@ fn walks_use_the_defined_weights_with_the_power_heuristic_and_without_some_joins
         };
         walks_use_the_defined_weights(&settings, 1000, 200);
     }
+}
+
+/// The shooting walker and the reference know how a gathering walker goes that is led to the light.
+#[test]
+fn walks_use_the_defined_weights_where_gathering_is_led() {
+    let settings = Settings { heuristic: Heuristic::Balance, guided_gathering: true, max_length: 7, ..Settings::default() };
+    walks_use_the_defined_weights(&settings, 1500, 150);
 }
 
 /// A connection between nearly specular vertices shares its path with a merge at either end.

@@ -22,7 +22,7 @@ use super::evidence::{Evidence, Findings};
 use super::{Decisions, Pilot};
 use crate::transport::Technique;
 use crate::transport::mis::Heuristic;
-use crate::transport::settings::{Settings, Techniques};
+use crate::transport::settings::{Plan, Settings, Techniques};
 
 /// Light paths per pixel that are considered.
 const LIGHT_PATHS: [f64; 6] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0];
@@ -32,6 +32,8 @@ const LOST: f64 = 1e-5;
 const MERGE_MUST_WIN: f64 = 1.25;
 /// Everything is on unless doing without wins by this factor: the estimate has noise itself.
 const LESS_MUST_WIN: f64 = 1.02;
+/// Guided gathering must win by this factor.
+const GUIDE_MUST_WIN: f64 = 1.1;
 /// Cost of operations, in units of a step of a gathering walk: user time of passes of five scenes with and
 /// without each join, divided by its counts. Only ratios matter, and only as far as they change the order of candidates.
 struct Costs {
@@ -47,6 +49,8 @@ struct Costs {
     branch: f64,
     /// A ray from the eye that only chains ask for.
     look: f64,
+    /// Learned directions of a vertex, for either walker.
+    directions: f64,
 }
 const COSTS: Costs = Costs {
     gather_walk: 1.7,
@@ -60,6 +64,7 @@ const COSTS: Costs = Costs {
     keep: 0.4,
     branch: 1.2,
     look: 0.7,
+    directions: 1.0,
 };
 
 /// Numbers of joins that could be used.
@@ -87,6 +92,13 @@ impl Candidate {
             }
         }
         all
+    }
+
+    /// What a plan does, for so many pixels.
+    fn of(plan: &Plan, pixels: u32) -> Self {
+        let t = plan.settings.techniques;
+        let light_paths = f64::from(plan.light_paths) / f64::from(pixels);
+        Self { light_paths, next_event: t.next_event, connect: t.connect, merge: t.merge }
     }
 
     fn noise(&self, evidence: &[Evidence]) -> f64 {
@@ -137,6 +149,21 @@ impl Candidate {
     }
 }
 
+/// Whether gathering walks should go where light was found to come from, by `paths` walks of either kind that do.
+pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> bool {
+    let mut plan = pilot.plan(decisions);
+    plan.settings.heuristic = Heuristic::Balance;
+    let candidate = Candidate::of(&plan, pilot.pixels());
+    let found = Findings::collected(pilot, plan, &pilot.dark_squares(), paths);
+    let noise = |unguided: bool| {
+        let counts = found.evidence.iter().filter(|e| e.chain.is_none() && !(e.steady && candidate.next_event));
+        counts.map(|e| e.square / if unguided { e.unguided.max(LOST) } else { 1.0 }).sum::<f64>()
+    };
+    let cost = candidate.cost(&found);
+    let more = COSTS.directions * (found.eye.ends + candidate.light_paths * found.light.ends);
+    noise(false) * (cost + more) * GUIDE_MUST_WIN < noise(true) * cost
+}
+
 /// The settings of the best candidate, judged on `paths` light paths and as large a part of the pixels.
 pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Settings {
     let mut plan = pilot.plan(decisions);
@@ -149,7 +176,7 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
     let found = Findings::collected(pilot, plan, &dark_squares, paths);
     let branchings = found.branchings(pilot.settings.faint);
     let ways: Vec<_> = branchings.iter().flat_map(|b| SAMPLES.map(|samples| (b, samples))).collect();
-    let pixels = pilot.crop[2].saturating_mul(pilot.crop[3]);
+    let pixels = pilot.pixels();
     let candidates = Candidate::all(pilot.settings, pixels);
     let judged = candidates.iter().flat_map(|c| {
         let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };

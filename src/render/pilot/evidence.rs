@@ -7,7 +7,7 @@ use crate::math::random::Family;
 use crate::scene::Surface;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
-use crate::transport::reference::{Subpath, Testimony, Witness};
+use crate::transport::reference::{Subpath, Testimony, Witness, products};
 use crate::transport::settings::Plan;
 use crate::transport::shoot::shoot;
 use crate::transport::vertex::Scatter;
@@ -41,6 +41,8 @@ pub(super) struct Evidence {
     pub(super) shares: [f64; Technique::ALL.len()],
     /// Without noise where next events are on: a delta light seen at the first vertex.
     pub(super) steady: bool,
+    /// How much more rarely it would be found without guided gathering, where that is on: a factor on the density.
+    pub(super) unguided: f64,
     /// Share of the pixel that its chain carries, where it is one of [`crate::transport::chain`].
     pub(super) chain: Option<f32>,
 }
@@ -157,9 +159,9 @@ pub(super) struct Findings {
 impl Findings {
     /// From `paths` light paths and as large a part of the pixels, all joins of `plan` on.
     pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, dark_squares: &[f64], paths: u32) -> Self {
-        let share = f64::from(paths) / f64::from(plan.light_paths.max(1));
+        let share = f64::from(paths) / f64::from(pilot.part(&plan).max(1));
         let squares = pilot.squares();
-        let (shot, pieces, subpaths) = shot(pilot, &plan, &squares, paths, share);
+        let (shot, pieces, subpaths) = shot(pilot, &plan, &squares, if plan.light_paths > 0 { paths } else { 0 }, share);
         let cache = LightCache::new(pieces, plan.merge_radius);
         let pixels = pilot.crop[2].saturating_mul(pilot.crop[3]);
         let walks = (f64::from(pixels) * share).ceil() as u32;
@@ -195,7 +197,8 @@ fn shot(pilot: &Pilot<'_>, plan: &Plan, squares: &[f64], paths: u32, share: f64)
             }
             watch.counts.steps = rays.shoot as f64;
             let seen = watch.witness.seen.iter().zip(&splats.0);
-            let tell = |t, cell: Cell| evidence(cx, t, squares[cell as usize], 1.0 / share);
+            let unguided = without_incident(plan);
+            let tell = |t, cell: Cell| evidence((cx, unguided.as_ref()), t, squares[cell as usize], 1.0 / share);
             let evidence = seen.filter_map(|(t, raster)| tell(t, pilot.cell(*raster)?)).collect();
             let found = Found { evidence, counts: watch.counts, ..Found::default() };
             (found, vertices, watch.witness.into_subpaths())
@@ -227,6 +230,7 @@ fn gathered(
             let mut watch = Watch::new(Witness::with_subpaths(subpaths.clone()));
             let mut rays = RayCounts::default();
             let (mut found, mut merges) = (vec![], 0.0);
+            let unguided = without_incident(plan);
             for index in job * JOB..((job + 1) * JOB).min(walks) {
                 let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 35, 0, plan.settings.seed);
                 let raster = pilot.raster(index, walks, &mut random);
@@ -242,7 +246,8 @@ fn gathered(
                     }
                     let merge = t.key.0 == Technique::Merge;
                     merges += if merge { 1.0 / share } else { 0.0 };
-                    let told = evidence(cx, &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
+                    let told =
+                        evidence((cx, unguided.as_ref()), &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
                     // A lamp's image shines on its cell alone, its reflections on dark ones around it.
                     let darker = if chain.is_some() { squares[cell as usize] / dark_squares[cell as usize] } else { 1.0 };
                     found.extend(told.map(|e| Evidence { chain, square: e.square * darker, ..e }));
@@ -268,7 +273,12 @@ fn clip(evidence: &mut [Evidence]) {
     evidence.iter_mut().filter(|e| e.chain.is_none()).for_each(|e| e.square = e.square.min(most));
 }
 
-fn evidence(cx: Context<'_>, t: &Testimony, square: f64, often: f64) -> Option<Evidence> {
+/// The plan without guided gathering, where it has that.
+fn without_incident(plan: &Plan) -> Option<Plan> {
+    plan.incident.is_some().then(|| Plan { incident: None, ..plan.clone() })
+}
+
+fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square: f64, often: f64) -> Option<Evidence> {
     let value = f64::from(t.value.mean());
     if !(value > 0.0 && value.is_finite() && square > 0.0) {
         return None;
@@ -277,10 +287,18 @@ fn evidence(cx: Context<'_>, t: &Testimony, square: f64, often: f64) -> Option<E
     for ((technique, _), weight) in t.path.weights(cx) {
         shares[technique as usize] += weight;
     }
+    let unguided = unguided.map_or(1.0, |plan| {
+        let total = |plan: &Plan| {
+            let joins = products(&t.path.densities(cx.scene, plan), plan, f64::from(cx.eta));
+            joins.iter().map(|j| j.1).sum::<f64>()
+        };
+        total(plan) / total(cx.plan)
+    });
     let steady = t.path.light_delta && t.path.vertices.len() == 1;
-    shares.iter().sum::<f64>().is_finite().then_some(Evidence {
+    (shares.iter().sum::<f64>().is_finite() && unguided.is_finite()).then_some(Evidence {
         square: often * value * value / square,
         shares,
+        unguided,
         steady,
         chain: None,
     })
@@ -292,7 +310,7 @@ mod tests {
 
     #[test]
     fn luck_does_not_decide() {
-        let of = |square| Evidence { square, shares: [1.0, 0.0, 0.0, 0.0, 0.0], steady: false, chain: None };
+        let of = |square| Evidence { square, shares: [1.0, 0.0, 0.0, 0.0, 0.0], unguided: 1.0, steady: false, chain: None };
         let mut evidence: Vec<Evidence> = (0..1000).map(|_| of(1.0)).collect();
         clip(&mut evidence);
         assert!(evidence.iter().all(|e| e.square == 1.0));

@@ -13,20 +13,25 @@ mod branching;
 mod chains;
 mod choice;
 mod evidence;
+mod trail;
 
 use crate::math::Random;
 use crate::math::random::Family;
-use crate::scene::Scene;
 use crate::scene::emitter::Emission;
 use crate::scene::emitter::guide::{Guide, Start};
-use crate::transport::cache::LightCache;
+use crate::scene::{Scene, Surface};
+use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::{follow, gather};
-use crate::transport::settings::{NO_BRANCHES, Plan, Settings, Techniques};
+use crate::transport::incident::{Incident, Lesson};
+use crate::transport::settings::{Coupling, NO_BRANCHES, Plan, Settings, Techniques};
 use crate::transport::shoot::shoot;
+use crate::transport::vertex::Scatter;
 use crate::transport::walk::{Context, Join, Observe, Tally};
 use crate::transport::{Contribution, RayCounts, Record, Technique};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::sync::Arc;
+use trail::{NONE, Tracker, Trail, shifted};
 
 /// Light paths of a job.
 const JOB: u32 = 1024;
@@ -63,6 +68,8 @@ pub struct Decisions {
     pub merge_radius: f32,
     /// Where light paths start.
     pub guide: Guide,
+    /// Where gathering walks find light, if they are to go there.
+    pub incident: Option<Arc<Incident>>,
 }
 
 /// Runs the pilot of a render of the crop window `crop` (x, y, width, height).
@@ -70,40 +77,58 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let t = settings.techniques;
     let connects = t.connect && settings.connections > 0;
     let nothing = Decisions::nothing(settings);
-    if !(t.splat || connects || t.merge) || scene.lights.is_empty() {
+    // Where gathering walks go is learned where it is asked for, or may be chosen.
+    let mut goes =
+        settings.coupling == Coupling::All && t.gathers() && (settings.guided_gathering || settings.automatic && settings.guided);
+    if !(t.splat || connects || t.merge || goes) || scene.lights.is_empty() {
         return nothing;
     }
     let mut pilot = Pilot::new(scene, settings, crop);
     // The first round only counts, since without a count there are no connections to learn from.
     let merge_radius = if t.merge { settings.merge_radius.unwrap_or_else(|| pilot.merge_radius()) } else { 0.0 };
     let mut decisions = Decisions { merge_radius, ..nothing };
-    let last = (pilot.plan(&decisions).light_paths / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
+    let last = (pilot.part(&pilot.plan(&decisions)) / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
     let mut learner = Guide::new(&scene.lights);
+    let mut lessons = vec![];
     for round in 0..ROUNDS {
         let paths = (last >> (ROUNDS - 1 - round)).max(JOB);
         if round == CHOICE && settings.automatic {
             decisions.settings = choice::choose(&pilot, &decisions, paths.min(JUDGES));
-            let t = decisions.settings.techniques;
-            if !t.shoots() {
-                return Decisions::nothing(&decisions.settings);
+            if !decisions.settings.techniques.shoots() {
+                decisions = Decisions::nothing(&decisions.settings);
             }
         }
-        let (vertices, lessons) = pilot.round(&decisions, round, paths);
-        if decisions.settings.techniques.connect {
-            decisions.vertices_per_path = vertices as f64 / f64::from(paths);
+        let found = pilot.round(&decisions, (round, paths), goes);
+        let t = decisions.settings.techniques;
+        if t.connect {
+            decisions.vertices_per_path = found.vertices as f64 / f64::from(paths);
         }
-        if settings.guided {
-            lessons.iter().for_each(|(start, value)| learner.learn(start, *value));
+        if settings.guided && t.shoots() {
+            found.starts.iter().for_each(|(start, value)| learner.learn(start, *value));
             learner = learner.refined(&scene.lights);
             decisions.guide = learner.clone();
         }
+        if goes {
+            lessons.extend(found.incident);
+            if round >= CHOICE {
+                decisions.incident = Some(Arc::new(Incident::learned(&lessons)));
+            }
+            if round == CHOICE && !settings.guided_gathering && !choice::goes(&pilot, &decisions, paths.min(JUDGES)) {
+                goes = false;
+                decisions.incident = None;
+            }
+        }
+        if !goes && !t.shoots() {
+            break;
+        }
     }
+    decisions.settings.guided_gathering = decisions.incident.is_some();
     decisions
 }
 
 impl Decisions {
     fn nothing(settings: &Settings) -> Self {
-        Self { settings: settings.clone(), vertices_per_path: 0.0, merge_radius: 0.0, guide: Guide::default() }
+        Self { settings: settings.clone(), vertices_per_path: 0.0, merge_radius: 0.0, guide: Guide::default(), incident: None }
     }
 
     /// The counts that follow for a render of the crop window `crop`.
@@ -111,7 +136,8 @@ impl Decisions {
         let pixels = crop[2].saturating_mul(crop[3]);
         let film = scene.film.width.saturating_mul(scene.film.height);
         let settings = Settings { merge_radius: Some(self.merge_radius), ..self.settings.clone() };
-        Plan { guide: self.guide.clone(), ..Plan::new(&settings, pixels, film, self.vertices_per_path) }
+        let incident = self.incident.clone();
+        Plan { guide: self.guide.clone(), incident, ..Plan::new(&settings, pixels, film, self.vertices_per_path) }
     }
 
     /// For the identity of a film: all that enters densities and weights and is not the scene's or the
@@ -124,6 +150,7 @@ impl Decisions {
         bytes.extend(self.merge_radius.to_bits().to_le_bytes());
         bytes.extend(self.settings.faint.to_bits().to_le_bytes());
         bytes.extend(self.settings.chain_samples.to_le_bytes());
+        bytes.push(u8::from(self.settings.guided_gathering));
         bytes
     }
 }
@@ -148,6 +175,8 @@ struct Seen {
     value: f32,
     /// Index of the light path in the round; `u32::MAX` where none took part.
     path: u32,
+    /// Last steps of both walks, in the trails of the round.
+    steps: [u32; 2],
     /// Factor on the square of the value: how much more often a whole pass finds the like.
     often: f32,
 }
@@ -158,14 +187,33 @@ struct Collect<'p> {
     seen: Vec<Seen>,
     starts: Vec<Option<Start>>,
     guide: &'p Guide,
+    tracker: Tracker<'p>,
+    /// Step of each vertex that went into the cache.
+    cached: Vec<u32>,
+    /// Step from which each splat was seen.
+    seen_at: Vec<u32>,
 }
 
 impl Observe for Collect<'_> {
-    fn started(&mut self, _from: Vec3, light: Option<&Emission>) {
+    fn started(&mut self, from: Vec3, light: Option<&Emission>) {
+        self.tracker.started(from, light);
         let start = light.and_then(|e| self.pilot.scene.lights.start(self.guide, e));
         if let Some(last) = self.starts.last_mut() {
             *last = start;
         }
+    }
+    fn arrived(&mut self, surface: &Surface) {
+        self.tracker.arrived(surface);
+    }
+    fn cached(&mut self, _: &LightVertex) {
+        self.cached.push(self.tracker.last);
+    }
+    fn scattered(&mut self, s: &Scatter) {
+        self.tracker.scattered(s);
+    }
+    fn joined(&mut self, join: Join<'_>) {
+        // A lamp seen directly is no walk's.
+        self.seen_at.push(if join.length > 1 { self.tracker.last } else { NONE });
     }
 }
 
@@ -177,12 +225,23 @@ impl Record for Splats<'_> {
     }
 }
 
-/// Joins of a gathering walk: values with the index of the light vertex, where one took part.
-#[derive(Default)]
-struct Joins(Vec<(f32, Technique, usize)>);
-impl Observe for Joins {
+/// Joins of a gathering walk: values with the index of the light vertex, where one took part, and the walk's last step.
+struct Joins<'a> {
+    found: Vec<(f32, Technique, usize, u32)>,
+    tracker: Tracker<'a>,
+}
+impl Observe for Joins<'_> {
+    fn started(&mut self, from: Vec3, light: Option<&Emission>) {
+        self.tracker.started(from, light);
+    }
+    fn arrived(&mut self, surface: &Surface) {
+        self.tracker.arrived(surface);
+    }
+    fn scattered(&mut self, s: &Scatter) {
+        self.tracker.scattered(s);
+    }
     fn joined(&mut self, join: Join<'_>) {
-        self.0.push((join.value.mean(), join.technique, join.light_vertex));
+        self.found.push((join.value.mean(), join.technique, join.light_vertex, self.tracker.last));
     }
 }
 
@@ -207,7 +266,7 @@ impl Observe for Footprints {
             ..Self::default()
         };
     }
-    fn arrived(&mut self, surface: &crate::scene::Surface) {
+    fn arrived(&mut self, surface: &Surface) {
         self.distance += surface.p.distance(self.last);
         self.last = surface.p;
         if self.after_focused {
@@ -215,7 +274,7 @@ impl Observe for Footprints {
             self.found.push(spread / self.density);
         }
     }
-    fn scattered(&mut self, s: &crate::transport::vertex::Scatter) {
+    fn scattered(&mut self, s: &Scatter) {
         if s.focused && self.after_focused {
             self.found.pop();
         }
@@ -227,9 +286,20 @@ impl Observe for Footprints {
 struct Shot {
     seen: Vec<Seen>,
     starts: Vec<Option<Start>>,
-    vertices: Vec<crate::transport::cache::LightVertex>,
-    /// Light path of each vertex.
-    owners: Vec<u32>,
+    vertices: Vec<LightVertex>,
+    /// Light path of each vertex, and its step.
+    owners: Vec<(u32, u32)>,
+    trail: Trail,
+}
+
+/// What a round taught.
+struct Round {
+    /// Light vertices.
+    vertices: u64,
+    /// What each light path that was of use is worth.
+    starts: Vec<(Start, f64)>,
+    /// Where light was found to arrive.
+    incident: Vec<Lesson>,
 }
 
 impl<'a> Pilot<'a> {
@@ -294,38 +364,56 @@ impl<'a> Pilot<'a> {
         f64::from((self.crop[2] - x).min(self.step) * (self.crop[3] - y).min(self.step))
     }
 
-    /// One round: the number of light vertices, and what each light path that was of use is worth.
-    fn round(&mut self, so_far: &Decisions, round: u32, paths: u32) -> (u64, Vec<(Start, f64)>) {
+    fn pixels(&self) -> u32 {
+        self.crop[2].saturating_mul(self.crop[3])
+    }
+
+    /// Walks of either kind in a whole pass, of which a round has a part.
+    fn part(&self, plan: &Plan) -> u32 {
+        if plan.light_paths > 0 { plan.light_paths } else { self.pixels() }
+    }
+
+    /// One round, with so many light paths or, where there are none, as many gathering walks.
+    fn round(&mut self, so_far: &Decisions, (round, paths): (u32, u32), goes: bool) -> Round {
         let mut plan = self.plan(so_far);
-        let shots: Vec<Shot> = (0..paths.div_ceil(JOB)).into_par_iter().map(|job| self.shoot(&plan, round, job, paths)).collect();
-        let (mut seen, mut starts, mut owners, mut pieces) = (vec![], vec![], vec![], vec![]);
+        let shot = if plan.light_paths > 0 { paths } else { 0 };
+        let shots: Vec<Shot> =
+            (0..shot.div_ceil(JOB)).into_par_iter().map(|job| self.shoot(&plan, round, (job, paths), goes)).collect();
+        let (mut seen, mut starts, mut owners, mut pieces, mut trail) = (vec![], vec![], vec![], vec![], Trail::default());
         for shot in shots {
-            seen.extend(shot.seen);
+            let offset = trail.append(shot.trail);
+            seen.extend(shot.seen.into_iter().map(|s| Seen { steps: s.steps.map(|i| shifted(i, offset)), ..s }));
             starts.extend(shot.starts);
-            owners.extend(shot.owners);
+            owners.extend(shot.owners.into_iter().map(|(path, step)| (path, shifted(step, offset))));
             pieces.push(shot.vertices);
         }
         let cache = LightCache::new(pieces, plan.merge_radius);
         // Of N light paths and P pixels per pass, n light paths and n·P/N pixels take part.
         let pixels = f64::from(self.crop[2]) * f64::from(self.crop[3]);
-        let share = f64::from(paths) / f64::from(plan.light_paths.max(1));
+        let share = f64::from(paths) / f64::from(self.part(&plan).max(1));
         let walks = if plan.settings.techniques.gathers() { (pixels * share).ceil() as u32 } else { 0 };
         // Connections and merges of the whole pass are estimated from the light vertices of this part.
         plan.inv_light_paths = 1.0 / paths as f32;
-        let gathered: Vec<Vec<Seen>> = (0..walks.div_ceil(JOB))
+        let gathered: Vec<(Vec<Seen>, Trail)> = (0..walks.div_ceil(JOB))
             .into_par_iter()
-            .map(|job| self.gather(&plan, round, (job, walks), (&cache, &owners, share as f32)))
+            .map(|job| self.gather(&plan, round, (job, walks), (&cache, &owners, share as f32), goes))
             .collect();
         let eye_share = f64::from(walks) / pixels;
         self.weight += share;
         for s in &seen {
             self.image[s.cell as usize] += f64::from(s.value);
         }
-        for s in gathered.iter().flatten() {
+        for s in gathered.iter().flat_map(|(seen, _)| seen) {
             self.image[s.cell as usize] += f64::from(s.value) * share / eye_share;
         }
-        seen.extend(gathered.into_iter().flatten().filter(|s| s.path != u32::MAX));
-        (u64::from(cache.len()), self.lessons(&seen, &starts))
+        for (found, steps) in gathered {
+            let offset = trail.append(steps);
+            seen.extend(found.into_iter().map(|s| Seen { steps: [shifted(s.steps[0], offset), s.steps[1]], ..s }));
+        }
+        let squares = self.squares();
+        let relative = |s: &Seen| f64::from(s.value) / squares[s.cell as usize].max(f64::MIN_POSITIVE).sqrt();
+        let incident = trail.lessons(seen.iter().flat_map(|s| s.steps.map(|step| (step, relative(s)))));
+        Round { vertices: u64::from(cache.len()), starts: self.lessons(&squares, &seen, &starts), incident }
     }
 
     /// Square of the coarse image per pixel, and a little more, so that black parts do not outweigh all.
@@ -366,10 +454,9 @@ impl<'a> Pilot<'a> {
     }
 
     /// √Σ (v/I)² of each light path over its contributions.
-    fn lessons(&self, seen: &[Seen], starts: &[Option<Start>]) -> Vec<(Start, f64)> {
-        let squares = self.squares();
+    fn lessons(&self, squares: &[f64], seen: &[Seen], starts: &[Option<Start>]) -> Vec<(Start, f64)> {
         let mut worth = vec![0.0f64; starts.len()];
-        for s in seen {
+        for s in seen.iter().filter(|s| s.path != u32::MAX) {
             let square = squares[s.cell as usize];
             if square > 0.0 {
                 worth[s.path as usize] += f64::from(s.often) * f64::from(s.value).powi(2) / square;
@@ -381,24 +468,28 @@ impl<'a> Pilot<'a> {
         of_use.into_iter().map(|(start, w)| (start, w.min(most).sqrt())).collect()
     }
 
-    fn shoot(&self, plan: &Plan, round: u32, job: u32, paths: u32) -> Shot {
+    fn shoot(&self, plan: &Plan, round: u32, (job, paths): (u32, u32), goes: bool) -> Shot {
         let cx = Context::new(self.scene, plan, 0);
         let keeps = plan.settings.techniques.connect || plan.keeps_vertices();
-        let mut observe = Collect { pilot: self, seen: vec![], starts: vec![], guide: &plan.guide };
+        let tracker = Tracker::new(self.scene, plan.settings.techniques.next_event, goes);
+        let (guide, starts, cached, seen_at) = (&plan.guide, vec![], vec![], vec![]);
+        let mut observe = Collect { pilot: self, seen: vec![], starts, guide, tracker, cached, seen_at };
         let (mut vertices, mut owners, mut pending, mut rays) = (vec![], vec![], vec![], RayCounts::default());
         for index in job * JOB..((job + 1) * JOB).min(paths) {
             let mut random = Random::new(Family::Pilot, u64::from(index), u64::from(round), plan.settings.seed);
             observe.starts.push(None);
             let mut tally = Tally { record: &mut Splats(&mut pending), rays: &mut rays, observe: &mut observe };
             shoot(cx, keeps.then_some(&mut vertices), &mut random, &mut tally);
-            owners.resize(vertices.len(), index);
-            for (raster, value) in pending.drain(..).filter(|(_, value)| value.is_finite()) {
+            owners.extend(observe.cached.drain(..).map(|step| (index, step)));
+            for ((raster, value), step) in
+                pending.drain(..).zip(observe.seen_at.drain(..)).filter(|((_, value), _)| value.is_finite())
+            {
                 if let Some(cell) = self.cell(raster) {
-                    observe.seen.push(Seen { cell, value, path: index, often: 1.0 });
+                    observe.seen.push(Seen { cell, value, path: index, often: 1.0, steps: [NONE, step] });
                 }
             }
         }
-        Shot { seen: observe.seen, starts: observe.starts, vertices, owners }
+        Shot { seen: observe.seen, starts: observe.starts, vertices, owners, trail: observe.tracker.trail }
     }
 
     /// Gathers on `walks` pixels, with the light vertices of `share` of a pass.
@@ -407,29 +498,31 @@ impl<'a> Pilot<'a> {
         plan: &Plan,
         round: u32,
         (job, walks): (u32, u32),
-        (cache, owners, share): (&LightCache, &[u32], f32),
-    ) -> Vec<Seen> {
+        (cache, owners, share): (&LightCache, &[(u32, u32)], f32),
+        goes: bool,
+    ) -> (Vec<Seen>, Trail) {
         let cx = Context::new(self.scene, plan, 0);
         let (mut seen, mut rays) = (vec![], RayCounts::default());
+        let mut joins = Joins { found: vec![], tracker: Tracker::new(self.scene, plan.settings.techniques.next_event, goes) };
         for index in job * JOB..((job + 1) * JOB).min(walks) {
             // A walk's number beyond those of all light paths: the two never share a stream.
             let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 32, u64::from(round), plan.settings.seed);
             let raster = self.raster(index, walks, &mut random);
-            let mut joins = Joins::default();
             let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut joins };
             gather(cx, raster, 1.0, cache, &mut random, &mut tally);
+            let found = joins.found.drain(..);
             let Some(cell) = self.cell(raster) else { continue };
-            for (value, technique, vertex) in joins.0.into_iter().filter(|(value, ..)| value.is_finite()) {
+            for (value, technique, vertex, step) in found.filter(|(value, ..)| value.is_finite()) {
                 // A whole pass connects each light vertex as often, since there are more of both walks; a
                 // merge finds the more gathering vertices, each to share with more light vertices.
-                let (path, often) = match technique {
+                let ((path, light_step), often) = match technique {
                     Technique::Connect => (owners[vertex], 1.0),
                     Technique::Merge => (owners[vertex], share),
-                    _ => (u32::MAX, 1.0),
+                    _ => ((u32::MAX, NONE), 1.0),
                 };
-                seen.push(Seen { cell, value, path, often });
+                seen.push(Seen { cell, value, path, often, steps: [step, light_step] });
             }
         }
-        seen
+        (seen, joins.tracker.trail)
     }
 }
