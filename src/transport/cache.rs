@@ -15,25 +15,26 @@ pub struct LightVertex {
     pub surface: Surface,
     /// Unit direction to its predecessor (towards the light).
     pub w_back: Vec3,
-    /// Density with which gathering would take that direction as a learned one, where something was learned.
-    pub learned_back: Option<f32>,
+    /// Density with which gathering would take that direction as a learned one; negative where nothing was learned.
+    pub learned_back: f32,
     /// Flux arriving per light path, over its density.
     pub throughput: Spectrum,
     /// MIS sum on arrival.
     pub partial: Partial<f32>,
     /// Edges from the light point.
-    pub length: u32,
+    pub length: u16,
     /// Positions of the path expression from which the light is reached, this vertex excluded.
     pub class: Positions,
     /// The vertex next to the light scattered by a Dirac event.
     pub first_delta: bool,
     /// Where the light comes from.
     pub emitter: EmitterId,
-    /// It cannot be hit.
-    pub light_delta: bool,
     /// Reached by a focused event, and none itself: merges may end here.
     pub merges: bool,
 }
+
+/// Two lines of a cache.
+const _: () = assert!(size_of::<LightVertex>() == 128);
 
 /// All light vertices of one pass, in the order of their light paths; as many pieces as jobs made
 /// them, so that nothing is copied together.

@@ -350,7 +350,7 @@ fn connect<R: Record, O: Observe>(
             picked = next;
         }
         let (index, y) = picked;
-        let length = walk.length + 2 + y.length;
+        let length = walk.length + 2 + u32::from(y.length);
         if !plan.wants_length(length) {
             continue;
         }
@@ -361,7 +361,7 @@ fn connect<R: Record, O: Observe>(
         }
         let w = d / d2.sqrt();
         let Some(k_eye) = vertex.kernel(EQUATION, w) else { continue };
-        let light = Vertex::new(scene, y.surface, y.w_back).with_learned_back(y.learned_back);
+        let light = Vertex::again(scene, y.surface, y.w_back, y.learned_back);
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
         // A merge at either end exists only where the other end is focused.
@@ -402,13 +402,14 @@ fn meet<R: Record, O: Observe>(
     let paths = &cx.plan.settings.paths;
     // A merged vertex is an event of the gathering walk already.
     let from_light = if technique == Technique::Merge { y.class } else { paths.backward(y.class, Symbol::D) };
+    let light_delta = cx.scene.lights.is_delta(y.emitter);
     let path = Finished {
         from_eye: paths.forward(walk.class, Symbol::D),
         from_light,
         length,
         first_delta: walk.first_delta,
         last_delta: y.first_delta,
-        light_delta: y.light_delta,
+        light_delta,
     };
     let join = Join {
         technique,
@@ -416,12 +417,12 @@ fn meet<R: Record, O: Observe>(
         length,
         light: None,
         emitter: y.emitter,
-        light_delta: y.light_delta,
+        light_delta,
         light_vertex: index as usize,
         lens: Vec3::ZERO,
         value,
     };
-    finish(cx, path, value, join, y.length + 1, tally);
+    finish(cx, path, value, join, u32::from(y.length) + 1, tally);
 }
 
 /// Merges `vertex`, reached by a focused event, with the light vertices around it that were so as well.
@@ -438,7 +439,7 @@ fn merge<R: Record, O: Observe>(
     // Of η, the area of the disk and the number of light paths.
     let factor = plan.light_paths as f32 * plan.inv_light_paths / cx.eta;
     lights.around(vertex.surface.p, cx.merge_radius2, |index, y| {
-        let length = walk.length + 1 + y.length;
+        let length = walk.length + 1 + u32::from(y.length);
         if !plan.wants_length(length) || y.surface.n_g.dot(vertex.surface.n_g).abs() < SAME_SURFACE {
             return;
         }

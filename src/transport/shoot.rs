@@ -113,11 +113,10 @@ pub fn emit<R: Record, O: Observe>(
                     learned_back: vertex.learned_back(),
                     throughput: walk.throughput,
                     partial,
-                    length,
+                    length: length as u16,
                     class: walk.class,
                     first_delta: walk.first_delta,
                     emitter: start.point.emitter,
-                    light_delta: start.delta,
                     merges,
                 });
                 if let Some(v) = cache.last() {

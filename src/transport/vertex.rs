@@ -124,22 +124,27 @@ impl<'a> Vertex<'a> {
     /// The same for a shooting walk, which must know how a gathering walk would go.
     #[inline]
     pub fn shooting(scene: &'a Scene, incident: Option<&Incident>, surface: Surface, w_back: Vec3) -> Self {
-        let vertex = Self::new(scene, surface, w_back);
-        let back = vertex.directions(scene, incident).map(|d| d.density(w_back));
-        vertex.with_learned_back(back)
+        let mut vertex = Self::new(scene, surface, w_back);
+        if let Some(directions) = vertex.directions(scene, incident) {
+            vertex.learned = Learned::Back(directions.density(w_back));
+        }
+        vertex
     }
 
-    /// The density with which `w_back` would be taken as a learned direction, where something was learned.
+    /// The density with which `w_back` would be taken as a learned direction; negative where nothing was learned.
     #[inline]
-    pub fn learned_back(&self) -> Option<f32> {
-        if let Learned::Back(density) = self.learned { Some(density) } else { None }
+    pub fn learned_back(&self) -> f32 {
+        if let Learned::Back(density) = self.learned { density } else { -1.0 }
     }
 
-    /// With what [`Self::learned_back`] told.
+    /// The vertex of a shooting walk once more, with what [`Self::learned_back`] told.
     #[inline]
-    pub fn with_learned_back(mut self, back: Option<f32>) -> Self {
-        self.learned = back.map_or(Learned::Nothing, Learned::Back);
-        self
+    pub fn again(scene: &'a Scene, surface: Surface, w_back: Vec3, learned_back: f32) -> Self {
+        let mut vertex = Self::new(scene, surface, w_back);
+        if learned_back >= 0.0 {
+            vertex.learned = Learned::Back(learned_back);
+        }
+        vertex
     }
 
     /// Part of the directions that gathering takes by the local model.
