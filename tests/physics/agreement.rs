@@ -12,7 +12,7 @@ use nephroid::transport::settings::{Settings, Techniques};
 const ALPHA: f64 = 1e-4;
 /// At least this share of a scene's energy must be testable.
 const LEAST_ENERGY: f64 = 0.6;
-const EFFORT: Effort = Effort { renders: 40, passes: 3, max_length: 5 };
+const EFFORT: Effort = Effort { renders: 32, passes: 3, max_length: 5 };
 
 /// A join, and the class of paths (k ≥ 2) that it can make.
 const JOINS: [(&str, &str); 4] = [("hit", "E .+ L"), ("nee", "E .* D L"), ("splat", "E D .* L"), ("connect", "E .* D D .* L")];
