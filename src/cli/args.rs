@@ -3,7 +3,6 @@
 use super::units;
 use crate::render::layers::Joins;
 use crate::report::comparison::Metric;
-use crate::transport::mis::Heuristic;
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -150,16 +149,6 @@ pub enum HeuristicName {
     Power,
 }
 
-/// The library's own.
-impl Default for HeuristicName {
-    fn default() -> Self {
-        match Heuristic::default() {
-            Heuristic::Balance => Self::Balance,
-            Heuristic::Power => Self::Power,
-        }
-    }
-}
-
 /// Samplers by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum SamplerName {
@@ -293,9 +282,9 @@ pub struct TransportArgs {
     /// Joins that are allowed, instead of the estimator's.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub techniques: Option<Vec<TechniqueName>>,
-    /// How joins share a path.
-    #[arg(long, value_enum, value_name = "NAME", default_value_t)]
-    pub heuristic: HeuristicName,
+    /// How joins share a path [default: balance for --estimator auto, else power].
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub heuristic: Option<HeuristicName>,
     /// Shortest path in edges (1 = a lamp seen directly).
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub min_length: u32,

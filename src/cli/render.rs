@@ -143,10 +143,12 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
             merge: has(TechniqueName::Merge),
         };
     }
-    s.heuristic = match t.heuristic {
-        HeuristicName::Balance => Heuristic::Balance,
-        HeuristicName::Power => Heuristic::Power,
-    };
+    if let Some(name) = t.heuristic {
+        s.heuristic = match name {
+            HeuristicName::Balance => Heuristic::Balance,
+            HeuristicName::Power => Heuristic::Power,
+        };
+    }
     s.min_length = t.min_length;
     if let Some(MaxLength::Edges(n)) = t.max_length {
         s.max_length = n;

@@ -114,6 +114,7 @@ impl Options {
             coupling: estimator.coupling(),
             max_length: i.max_depth.unwrap_or(u32::MAX).min(estimator.longest()),
             automatic: estimator == Estimator::Auto,
+            heuristic: if estimator == Estimator::Auto { Heuristic::Balance } else { Heuristic::default() },
             rr_depth: i.rr_depth,
             survival: if estimator == Estimator::Auto { SURVIVAL } else { 1.0 },
             hide_emitters: i.hide_emitters,
