@@ -149,11 +149,14 @@ impl Candidate {
     }
 }
 
-/// Whether gathering walks should go where light was found to come from, by `paths` walks of either kind that do.
-pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> bool {
+/// Whether gathering walks should go where light was found to come from, by at most so many walks of either kind that do.
+pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool {
     let mut plan = pilot.plan(decisions);
     plan.settings.heuristic = Heuristic::Balance;
     let candidate = Candidate::of(&plan, pilot.pixels());
+    // Gathering walks are more than light paths where those are few.
+    let paths = (f64::from(most) * candidate.light_paths.clamp(0.125, 1.0)) as u32;
+    let paths = if plan.light_paths > 0 { paths } else { most };
     let found = Findings::collected(pilot, plan, &pilot.dark_squares(), paths);
     let noise = |unguided: bool| {
         let counts = found.evidence.iter().filter(|e| e.chain.is_none() && !(e.steady && candidate.next_event));

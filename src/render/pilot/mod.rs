@@ -113,7 +113,7 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
             if round >= CHOICE {
                 decisions.incident = Some(Arc::new(Incident::learned(&lessons)));
             }
-            if round == CHOICE && !settings.guided_gathering && !choice::goes(&pilot, &decisions, paths.min(JUDGES)) {
+            if round == CHOICE && !settings.guided_gathering && !choice::goes(&pilot, &decisions, paths.min(JUDGES / 2)) {
                 goes = false;
                 decisions.incident = None;
             }
