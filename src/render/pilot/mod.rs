@@ -91,7 +91,11 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let mut learner = Guide::new(&scene.lights);
     let mut lessons = vec![];
     for round in 0..ROUNDS {
-        let paths = (last >> (ROUNDS - 1 - round)).max(JOB);
+        let mut paths = (last >> (ROUNDS - 1 - round)).max(JOB);
+        if decisions.incident.is_some() {
+            // Where light paths are few, gathering walks are many.
+            paths = paths.min((pilot.part(&pilot.plan(&decisions)) / 2).max(JOB));
+        }
         if round == CHOICE && settings.automatic {
             decisions.settings = choice::choose(&pilot, &decisions, paths.min(JUDGES));
             if !decisions.settings.techniques.shoots() {
