@@ -2,6 +2,7 @@
 
 pub mod distribution;
 pub mod frame;
+mod limit;
 mod prefetch;
 pub mod quadtree;
 pub mod random;
@@ -9,5 +10,6 @@ mod sobol;
 pub mod warp;
 
 pub use frame::Frame;
+pub use limit::limit;
 pub use prefetch::prefetch;
 pub use random::Random;

@@ -7,7 +7,7 @@ use crate::transport::settings::{Coupling, Settings, Techniques};
 
 /// Longest path of recursive ray tracing, unless somebody says.
 const RECURSION: u32 = 16;
-/// [`Settings::survival`] of `auto`: on ten scenes up to a third less error than with 1, for at most a tenth more time.
+/// [`Settings::survival`] of `auto`: on ten scenes up to a third less error than with 1, mostly for at most a tenth more time.
 const SURVIVAL: f32 = 4.0;
 
 /// How the measurement is estimated.

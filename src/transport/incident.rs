@@ -14,8 +14,8 @@
 //! direction alone, so that the shooting walker knows it too ([`super::vertex`]): every weight sees it, and
 //! the measurement stays unbiased whatever was learned.
 
-use crate::math::Frame;
 use crate::math::warp::ONE_MINUS_EPSILON;
+use crate::math::{Frame, limit};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::{LN_2, LOG2_E, TAU};
@@ -40,6 +40,8 @@ const SHARPNESS: std::ops::RangeInclusive<f32> = 0.05..=2000.0;
 const FROM_EVERYWHERE: f64 = 0.2;
 /// A single lesson counts for at most this part of what a cell has learned.
 const MOST: f64 = 0.02;
+/// Steps towards that bound.
+const CLIPPINGS: u32 = 4;
 /// "No cell."
 const NONE: u32 = u32::MAX;
 
@@ -215,14 +217,7 @@ impl Lobes {
 /// Which of six sides a normal is nearest to.
 #[inline]
 fn side(n: Vec3) -> usize {
-    let a = n.abs();
-    let axis = if a.x >= a.y && a.x >= a.z {
-        0
-    } else if a.y >= a.z {
-        1
-    } else {
-        2
-    };
+    let axis = n.abs().max_position();
     2 * axis + usize::from(n[axis] < 0.0)
 }
 
@@ -303,10 +298,7 @@ impl Incident {
 
 /// The lobes of a cell.
 fn fit(lessons: &[Lesson]) -> Lobes {
-    let mut most = f64::INFINITY;
-    for _ in 0..4 {
-        most = MOST * lessons.iter().map(|l| f64::from(l.value).min(most)).sum::<f64>();
-    }
+    let most = limit(lessons.iter().map(|l| f64::from(l.value)), MOST, CLIPPINGS);
     let directions: Vec<(Vec3, f64)> = lessons.iter().map(|l| (l.w, f64::from(l.value).min(most))).collect();
     Lobes::fitted(&directions)
 }

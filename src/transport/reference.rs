@@ -95,13 +95,10 @@ impl Path {
             let p = v.surface.p;
             let w_eye = if i == 0 { -w } else { (self.vertices[i - 1].surface.p - p).normalize() };
             let w_light = if i + 1 == m { to_light } else { (self.vertices[i + 1].surface.p - p).normalize() };
+            let from_eye = Vertex::gathering(scene, plan.incident(), v.surface, w_eye);
             let (p_gather, p_shoot) = match v.dirac {
-                Some(e) => {
-                    let by_model = Vertex::gathering(scene, plan.incident(), v.surface, w_eye).by_model();
-                    (e.prob_gather * f64::from(by_model), e.prob_shoot * e.ratio)
-                }
+                Some(e) => (e.prob_gather * f64::from(from_eye.by_model()), e.prob_shoot * e.ratio),
                 None => {
-                    let from_eye = Vertex::gathering(scene, plan.incident(), v.surface, w_eye);
                     let from_light = Vertex::new(scene, v.surface, w_light);
                     (f64::from(from_eye.density(w_light)), f64::from(from_light.density(w_eye)))
                 }

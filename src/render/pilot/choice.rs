@@ -112,13 +112,16 @@ impl Candidate {
             Technique::Merge => n * on(self.merge),
         });
         let one = |e: &Evidence| {
-            if (e.steady && self.next_event) || e.chain.is_some() {
-                return 0.0;
-            }
             let rho: f64 = e.shares.iter().zip(numbers).map(|(r, n)| r * n).sum();
             e.square / rho.max(LOST)
         };
-        evidence.iter().map(one).sum()
+        self.noisy(evidence).map(one).sum()
+    }
+
+    /// What brings noise: not delta lights seen by next events; what chains vary is measured apart.
+    fn noisy<'e>(&self, evidence: &'e [Evidence]) -> impl Iterator<Item = &'e Evidence> {
+        let next_event = self.next_event;
+        evidence.iter().filter(move |e| e.chain.is_none() && !(e.steady && next_event))
     }
 
     /// Per pixel.
@@ -155,12 +158,12 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
     plan.settings.heuristic = Heuristic::Balance;
     let candidate = Candidate::of(&plan, pilot.pixels());
     // Gathering walks are more than light paths where those are few.
-    let paths = (f64::from(most) * candidate.light_paths.clamp(0.125, 1.0)) as u32;
-    let paths = if plan.light_paths > 0 { paths } else { most };
+    let part = if plan.light_paths > 0 { candidate.light_paths.clamp(0.125, 1.0) } else { 1.0 };
+    let paths = (f64::from(most) * part) as u32;
     let found = Findings::collected(pilot, plan, &pilot.dark_squares(), paths);
     let noise = |unguided: bool| {
-        let counts = found.evidence.iter().filter(|e| e.chain.is_none() && !(e.steady && candidate.next_event));
-        counts.map(|e| e.square / if unguided { e.unguided.max(LOST) } else { 1.0 }).sum::<f64>()
+        let one = |e: &Evidence| e.square / if unguided { e.unguided.max(LOST) } else { 1.0 };
+        candidate.noisy(&found.evidence).map(one).sum::<f64>()
     };
     let cost = candidate.cost(&found);
     let more = COSTS.directions * (found.eye.ends + candidate.light_paths * found.light.ends);

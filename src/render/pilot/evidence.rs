@@ -2,12 +2,12 @@
 
 use super::branching::{BranchRays, Branching};
 use super::{Cell, JOB, Pilot};
-use crate::math::Random;
 use crate::math::random::Family;
+use crate::math::{Random, limit};
 use crate::scene::Surface;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
-use crate::transport::reference::{Subpath, Testimony, Witness, products};
+use crate::transport::reference::{JoinKey, Subpath, Testimony, Witness, products};
 use crate::transport::settings::Plan;
 use crate::transport::shoot::shoot;
 use crate::transport::vertex::Scatter;
@@ -161,12 +161,14 @@ impl Findings {
     pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, dark_squares: &[f64], paths: u32) -> Self {
         let share = f64::from(paths) / f64::from(pilot.part(&plan).max(1));
         let squares = pilot.squares();
-        let (shot, pieces, subpaths) = shot(pilot, &plan, &squares, if plan.light_paths > 0 { paths } else { 0 }, share);
+        let unguided = plan.incident.is_some().then(|| Plan { incident: None, ..plan.clone() });
+        let (shot, pieces, subpaths) =
+            shot(pilot, (&plan, unguided.as_ref()), &squares, if plan.light_paths > 0 { paths } else { 0 }, share);
         let cache = LightCache::new(pieces, plan.merge_radius);
-        let pixels = pilot.crop[2].saturating_mul(pilot.crop[3]);
-        let walks = (f64::from(pixels) * share).ceil() as u32;
+        let walks = (f64::from(pilot.pixels()) * share).ceil() as u32;
         plan.inv_light_paths = 1.0 / paths as f32;
-        let eye = gathered(pilot, &plan, (&squares, dark_squares), (walks, share), &cache, &Arc::new(subpaths));
+        let eye =
+            gathered(pilot, (&plan, unguided.as_ref()), (&squares, dark_squares), (walks, share), &cache, &Arc::new(subpaths));
         let (light, merges) = (shot.per_walk(), eye.merges / f64::from(walks.max(1)));
         let mut found = Self { eye: eye.per_walk(), light, merges, branches: eye.branches, evidence: eye.evidence, walks };
         found.evidence.extend(shot.evidence);
@@ -182,7 +184,13 @@ impl Findings {
 }
 
 /// What light paths find; their vertices, and the subpaths that led to these.
-fn shot(pilot: &Pilot<'_>, plan: &Plan, squares: &[f64], paths: u32, share: f64) -> (Found, Vec<Vec<LightVertex>>, Vec<Subpath>) {
+fn shot(
+    pilot: &Pilot<'_>,
+    (plan, unguided): (&Plan, Option<&Plan>),
+    squares: &[f64],
+    paths: u32,
+    share: f64,
+) -> (Found, Vec<Vec<LightVertex>>, Vec<Subpath>) {
     let shots: Vec<_> = (0..paths.div_ceil(JOB))
         .into_par_iter()
         .map(|job| {
@@ -197,8 +205,7 @@ fn shot(pilot: &Pilot<'_>, plan: &Plan, squares: &[f64], paths: u32, share: f64)
             }
             watch.counts.steps = rays.shoot as f64;
             let seen = watch.witness.seen.iter().zip(&splats.0);
-            let unguided = without_incident(plan);
-            let tell = |t, cell: Cell| evidence((cx, unguided.as_ref()), t, squares[cell as usize], 1.0 / share);
+            let tell = |t, cell: Cell| evidence((cx, unguided), t, squares[cell as usize], 1.0 / share);
             let evidence = seen.filter_map(|(t, raster)| tell(t, pilot.cell(*raster)?)).collect();
             let found = Found { evidence, counts: watch.counts, ..Found::default() };
             (found, vertices, watch.witness.into_subpaths())
@@ -216,7 +223,7 @@ fn shot(pilot: &Pilot<'_>, plan: &Plan, squares: &[f64], paths: u32, share: f64)
 /// What `walks` gathering walks find, a `share` of a pass.
 fn gathered(
     pilot: &Pilot<'_>,
-    plan: &Plan,
+    (plan, unguided): (&Plan, Option<&Plan>),
     (squares, dark_squares): (&[f64], &[f64]),
     (walks, share): (u32, f64),
     cache: &LightCache,
@@ -230,7 +237,6 @@ fn gathered(
             let mut watch = Watch::new(Witness::with_subpaths(subpaths.clone()));
             let mut rays = RayCounts::default();
             let (mut found, mut merges) = (vec![], 0.0);
-            let unguided = without_incident(plan);
             for index in job * JOB..((job + 1) * JOB).min(walks) {
                 let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 35, 0, plan.settings.seed);
                 let raster = pilot.raster(index, walks, &mut random);
@@ -246,8 +252,7 @@ fn gathered(
                     }
                     let merge = t.key.0 == Technique::Merge;
                     merges += if merge { 1.0 / share } else { 0.0 };
-                    let told =
-                        evidence((cx, unguided.as_ref()), &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
+                    let told = evidence((cx, unguided), &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
                     // A lamp's image shines on its cell alone, its reflections on dark ones around it.
                     let darker = if chain.is_some() { squares[cell as usize] / dark_squares[cell as usize] } else { 1.0 };
                     found.extend(told.map(|e| Evidence { chain, square: e.square * darker, ..e }));
@@ -265,35 +270,25 @@ fn clip(evidence: &mut [Evidence]) {
     let by_luck = |e: &&Evidence| e.chain.is_none();
     // Of few, each may be twice their mean.
     let part = MOST.max(2.0 / evidence.iter().filter(by_luck).count().max(1) as f64);
-    let mut most = f64::INFINITY;
-    // Falls to the value that is the wanted part of the sum it leaves.
-    for _ in 0..CLIPPINGS {
-        most = part * evidence.iter().filter(by_luck).map(|e| e.square.min(most)).sum::<f64>();
-    }
+    let most = limit(evidence.iter().filter(by_luck).map(|e| e.square), part, CLIPPINGS);
     evidence.iter_mut().filter(|e| e.chain.is_none()).for_each(|e| e.square = e.square.min(most));
 }
 
-/// The plan without guided gathering, where it has that.
-fn without_incident(plan: &Plan) -> Option<Plan> {
-    plan.incident.is_some().then(|| Plan { incident: None, ..plan.clone() })
-}
-
+/// `unguided`: the plan without guided gathering, where it has that. Shares are those of the balance heuristic.
 fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square: f64, often: f64) -> Option<Evidence> {
     let value = f64::from(t.value.mean());
     if !(value > 0.0 && value.is_finite() && square > 0.0) {
         return None;
     }
     let mut shares = [0.0; Technique::ALL.len()];
-    for ((technique, _), weight) in t.path.weights(cx) {
-        shares[technique as usize] += weight;
+    let joins = |plan: &Plan| products(&t.path.densities(cx.scene, plan), plan, f64::from(cx.eta));
+    let total = |joins: &[(JoinKey, f64)]| joins.iter().map(|j| j.1).sum::<f64>();
+    let found = joins(cx.plan);
+    let density = total(&found);
+    for ((technique, _), product) in &found {
+        shares[*technique as usize] += if density > 0.0 { product / density } else { 0.0 };
     }
-    let unguided = unguided.map_or(1.0, |plan| {
-        let total = |plan: &Plan| {
-            let joins = products(&t.path.densities(cx.scene, plan), plan, f64::from(cx.eta));
-            joins.iter().map(|j| j.1).sum::<f64>()
-        };
-        total(plan) / total(cx.plan)
-    });
+    let unguided = unguided.map_or(1.0, |plan| total(&joins(plan)) / density);
     let steady = t.path.light_delta && t.path.vertices.len() == 1;
     (shares.iter().sum::<f64>().is_finite() && unguided.is_finite()).then_some(Evidence {
         square: often * value * value / square,
