@@ -287,8 +287,8 @@ fn class(t: &Testimony) -> String {
 
 fn strong(cx: Context<'_>, value: Spectrum, t: &Testimony, per: impl Fn(f64) -> f64) -> Strong {
     let densities = t.path.densities(cx.scene, cx.plan);
-    let eta = f64::from(cx.eta);
-    let joins = products(&densities, cx.plan, eta).into_iter().zip(weights(&densities, cx.plan, eta));
+    let merge = cx.merge.into();
+    let joins = products(&densities, cx.plan, merge).into_iter().zip(weights(&densities, cx.plan, merge));
     let possible = |((key, density), (_, weight)): ((JoinKey, f64), (JoinKey, f64))| Possible {
         by: Name::new(key.0, key.1),
         density,

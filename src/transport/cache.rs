@@ -15,8 +15,10 @@ pub struct LightVertex {
     pub surface: Surface,
     /// Unit direction to its predecessor (towards the light).
     pub w_back: Vec3,
-    /// Density with which gathering would take that direction as a learned one; negative where nothing was learned.
-    pub learned_back: f32,
+    /// What only some materials need. Where all events are focused: what [`Self::partial`] is more by in `b` where
+    /// all is focused between it and the eye, see [`Sums::clear`](super::walk::Sums::clear). Elsewhere: the density with
+    /// which gathering would take `w_back` as a learned direction; negative where nothing was learned.
+    pub by_material: f32,
     /// Flux arriving per light path, over its density.
     pub throughput: Spectrum,
     /// MIS sum on arrival.

@@ -65,7 +65,8 @@ pub fn follow<R: Record, O: Observe>(
         p: if p_sensor > 0.0 { p_sensor } else { 1.0 },
         delta: false,
         focused: false,
-        may_merge: false,
+        clear: true,
+        merge: [0.0; 2],
         from: start.lens,
         cos_from: 1.0,
         parallel: scene.sensor.is_orthographic(),
@@ -101,8 +102,9 @@ pub fn follow<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let partial = walk.partial(cx, arrival, vertex.focused, count);
+        let sums = walk.partial(cx, arrival, count);
         if !vertex.closure.is_delta() {
+            let partial = sums.at(vertex.focused);
             if plan.settings.techniques.next_event {
                 next_event(cx, &walk, &vertex, partial, random, tally);
             }
@@ -122,7 +124,7 @@ pub fn follow<R: Record, O: Observe>(
         let (u, u_lobe) = (random.axis2(), random.axis());
         let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
         tally.observe.scattered(&s);
-        walk.leave(cx, &vertex, arrival, partial, &s);
+        walk.leave(cx, EQUATION, &vertex, sums, &s);
         walk.classify(&plan.settings.paths, EQUATION, s.delta);
         if !walk.survives(plan, 1.0 / plan.settings.survival, random) {
             return;
@@ -361,20 +363,24 @@ fn connect<R: Record, O: Observe>(
         }
         let w = d / d2.sqrt();
         let Some(k_eye) = vertex.kernel(EQUATION, w) else { continue };
-        let light = Vertex::again(scene, y.surface, y.w_back, y.learned_back);
+        let light = Vertex::again(scene, y.surface, y.w_back, y.by_material);
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
         // A merge at either end exists only where the other end is focused.
-        let merged = |possible: bool| if possible { h.raise(cx.eta) } else { 0.0 };
+        let merged = |possible: bool| if possible { h.raise(cx.merge.at(walk.clear)) } else { 0.0 };
         let at_eye = merged(walk.focused && !vertex.focused && light.focused);
         let at_light = merged(y.merges && vertex.focused);
+        let mut behind = y.partial;
+        if light.focused && vertex.focused && walk.clear {
+            behind.b += y.by_material;
+        }
         let weight = mis::connect(
             h,
             plan.c,
             k_light.p_w * k_eye.cos_g * inv_d2,
             partial.at(h, k_eye.p_w_rev) + at_eye,
             k_eye.p_w * k_light.cos_g * inv_d2,
-            y.partial.at(h, k_light.p_w_rev) + at_light,
+            behind.at(h, k_light.p_w_rev) + at_light,
         );
         let value = walk.throughput * k_eye.value * y.throughput * k_light.value * (inv_d2 * inv_prob * weight);
         if value.is_black() {
@@ -444,7 +450,7 @@ fn merge<R: Record, O: Observe>(
             return;
         }
         let Some(k) = vertex.kernel(EQUATION, y.w_back) else { return };
-        let weight = mis::merge(h, cx.eta, partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
+        let weight = mis::merge(h, cx.merge.at(walk.clear), partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
         // Flux per area is irradiance: the kernel's cosine is already in it.
         let cos_g = if planted(Mutant::MergeCosine) { 1.0 } else { k.cos_g };
         let value = walk.throughput * y.throughput * k.value * (factor * weight / cos_g);

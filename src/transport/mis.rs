@@ -21,8 +21,12 @@
 //! η G_i S_i with η = Nπr², so 1 over its weight is 1 + (K_i + H_i)/η [Georgiev 2012; Hachisuka
 //! 2012]. Merges are made only between two focused events (Dirac events, or of a material that is nearly a mirror or
 //! clear glass), where hardly any other join finds anything; that is a property of the path, so weights remain a
-//! partition. A walker learns at the event after v_i that the merge at v_i exists, and adds its term there
-//! ([`Partial::and_merge`]).
+//! partition. A walker learns at the event after v_i that the merge at v_i exists, and adds its term there.
+//!
+//! A gathering walk that comes upon a caustic by chance merges all of it at once. By its density a merge would seem
+//! the best of all joins there, though all that is merged shares the one chance [cf. Grittmann 2021]: so it counts
+//! for less where not all events between it and the eye are focused ([`MergeCount`]). The shooting walker does not know that before
+//! the eye is reached, and carries the difference apart.
 //!
 //! The power heuristic (exponent 2) is the same recursion with every density and count squared.
 
@@ -65,6 +69,35 @@ impl Heuristic {
     }
 }
 
+/// What a merge counts for in the weights: η, or less.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MergeCount<R> {
+    /// Where all is focused between the eye and the merge: η.
+    pub clear: R,
+    /// Where a gathering walk came there by chance: η over how many light vertices it merges at once.
+    pub by_chance: R,
+}
+
+impl<R: Real> MergeCount<R> {
+    /// Of η and the number of light vertices that are merged at once.
+    #[inline(always)]
+    pub fn new(eta: R, crowd: R) -> Self {
+        Self { clear: eta, by_chance: if crowd > R::ONE { eta / crowd } else { eta } }
+    }
+
+    /// The one that applies.
+    #[inline(always)]
+    pub fn at(self, clear: bool) -> R {
+        if clear { self.clear } else { self.by_chance }
+    }
+}
+
+impl From<MergeCount<f32>> for MergeCount<f64> {
+    fn from(m: MergeCount<f32>) -> Self {
+        Self { clear: m.clear.into(), by_chance: m.by_chance.into() }
+    }
+}
+
 /// Partial sum of a subpath on arrival at a vertex: `a + b·raise(p_rev)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Partial<R> {
@@ -89,11 +122,11 @@ impl<R: Real> Partial<R> {
         self.a + self.b * h.raise(p_rev)
     }
 
-    /// The same where a merge is possible at the vertex before: `eta` merged light paths, `p` and `j`
-    /// as in [`Self::arrive`].
+    /// The same where a merge adds `sum` to the sum of the vertex before (its raised count, if it is there); `p` and `j` as
+    /// in [`Self::arrive`].
     #[inline(always)]
-    pub fn and_merge(self, h: Heuristic, eta: R, p: R, j: R) -> Self {
-        Self { a: self.a, b: self.b + h.raise(eta) * h.raise(j) / h.raise(p) }
+    pub fn and_merge(self, h: Heuristic, sum: R, p: R, j: R) -> Self {
+        Self { a: self.a, b: self.b + sum * h.raise(j) / h.raise(p) }
     }
 
     /// The sum after a Dirac event: no join can end there, and the reverse density is the
@@ -138,8 +171,8 @@ pub fn connect<R: Real>(h: Heuristic, c: R, s: R, k: R, g: R, l: R) -> R {
 }
 
 /// Weight of a merge of the vertex of a gathering walk (sum `k`) with one of a shooting walk (sum `l`);
-/// `eta` is N times the area in which vertices are merged.
+/// `count` is what it counts for.
 #[inline(always)]
-pub fn merge<R: Real>(h: Heuristic, eta: R, k: R, l: R) -> R {
-    share(h.raise(eta), k + l)
+pub fn merge<R: Real>(h: Heuristic, count: R, k: R, l: R) -> R {
+    share(h.raise(count), k + l)
 }

@@ -8,7 +8,7 @@
 //! with `G_i = g_1 … g_i` and `S_i = s_i … s_k`. In f64 and quadratic in the length: the recursion of
 //! [`super::mis`] is tested against it. A [`Witness`] watches walks and rebuilds their paths.
 
-use super::mis;
+use super::mis::{self, MergeCount};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
 use super::walk::{Context, Join, Observe};
@@ -136,7 +136,7 @@ impl Path {
 
     /// Weight of every join that could have made this path (k ≥ 2).
     pub fn weights(&self, cx: Context<'_>) -> Vec<(JoinKey, f64)> {
-        weights(&self.densities(cx.scene, cx.plan), cx.plan, f64::from(cx.eta))
+        weights(&self.densities(cx.scene, cx.plan), cx.plan, cx.merge.into())
     }
 }
 
@@ -146,8 +146,8 @@ fn jacobian(from: Vec3, to: &Surface) -> f64 {
     f64::from((d.normalize()).dot(to.n_g).abs()) / f64::from(d.length_squared())
 }
 
-/// The density of every join: how many such paths it makes per sample and product of areas; `eta` as in [`Context`].
-pub fn products(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+/// The density of every join: how many such paths it makes per sample and product of areas; `merge` as in [`Context`].
+pub fn products(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let gathered = |i: usize| d.g[1..=i].iter().product::<f64>();
@@ -169,16 +169,16 @@ pub fn products(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), f64::from(plan.n) * shot(1)));
     }
-    for i in (2..k - 1).filter(|i| merges_at(d, *i, eta)) {
-        joins.push(((Technique::Merge, k - i + 1), eta * gathered(i) * shot(i)));
+    for (i, count) in (2..k - 1).map(|i| (i, merged_at(d, i, merge))).filter(|m| m.1 > 0.0) {
+        joins.push(((Technique::Merge, k - i + 1), count * gathered(i) * shot(i)));
     }
     joins
 }
 
-/// Weights from the products of densities; `eta` as in [`Context`].
-pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+/// Weights from the products of densities; `merge` as in [`Context`].
+pub fn weights(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinKey, f64)> {
     let h = plan.settings.heuristic;
-    let mut joins = products(d, plan, eta);
+    let mut joins = products(d, plan, merge);
     let total: f64 = joins.iter().map(|j| h.raise(j.1)).sum();
     for j in &mut joins {
         j.1 = if total > 0.0 { h.raise(j.1) / total } else { 0.0 };
@@ -186,13 +186,14 @@ pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     joins
 }
 
-/// Whether v_i can be a merged vertex: between two focused events, and none itself.
-fn merges_at(d: &Densities, i: usize, eta: f64) -> bool {
-    eta > 0.0 && d.focused[i - 1] && !d.focused[i] && d.focused[i + 1]
+/// What a merge at v_i counts for: 0 where there is none, since it is not between two focused events or is one itself.
+fn merged_at(d: &Densities, i: usize, merge: MergeCount<f64>) -> f64 {
+    let possible = i > 1 && d.focused[i - 1] && !d.focused[i] && d.focused[i + 1];
+    if possible { merge.at(d.focused[1..i].iter().all(|f| *f)) } else { 0.0 }
 }
 
 /// The same weights by the recursion of [`mis`], on numbers instead of walks.
-pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let h = plan.settings.heuristic;
@@ -217,8 +218,8 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKe
             c
         };
         *arrived = mis::Partial::arrive(h, count, d.g[i], 1.0, sum);
-        if i > 2 && merges_at(d, i - 1, eta) {
-            *arrived = arrived.and_merge(h, eta, d.g[i], 1.0);
+        if i > 2 {
+            *arrived = arrived.and_merge(h, h.raise(merged_at(d, i - 1, merge)), d.g[i], 1.0);
         }
         sum = resolve(*arrived, i, if i > 1 { d.s[i - 1] } else { 0.0 });
     }
@@ -233,8 +234,8 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKe
             c
         };
         shoot[i] = mis::Partial::arrive(h, count, d.s[i], 1.0, sum);
-        if i + 2 < k && merges_at(d, i + 1, eta) {
-            shoot[i] = shoot[i].and_merge(h, eta, d.s[i], 1.0);
+        if i + 2 < k {
+            shoot[i] = shoot[i].and_merge(h, h.raise(merged_at(d, i + 1, merge)), d.s[i], 1.0);
         }
         sum = resolve(shoot[i], i, d.g[i + 1]);
     }
@@ -250,7 +251,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKe
     if plan.c > 0.0 {
         for i in 1..k.saturating_sub(1) {
             if !d.delta[i] && !d.delta[i + 1] {
-                let merged = |i: usize| if merges_at(d, i, eta) { h.raise(eta) } else { 0.0 };
+                let merged = |i: usize| h.raise(merged_at(d, i, merge));
                 let (k_i, h_next) = (k_at(i) + merged(i), h_at(i + 1) + merged(i + 1));
                 let w = mis::connect(h, c, d.s[i], k_i, d.g[i + 1], h_next);
                 joins.push(((Technique::Connect, k - i), w));
@@ -260,8 +261,8 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKe
     if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), mis::splat(h, n, d.g[1], h_at(1))));
     }
-    for i in (2..k - 1).filter(|i| merges_at(d, *i, eta)) {
-        joins.push(((Technique::Merge, k - i + 1), mis::merge(h, eta, k_at(i), h_at(i))));
+    for (i, count) in (2..k - 1).map(|i| (i, merged_at(d, i, merge))).filter(|m| m.1 > 0.0) {
+        joins.push(((Technique::Merge, k - i + 1), mis::merge(h, count, k_at(i), h_at(i))));
     }
     joins
 }

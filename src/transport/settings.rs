@@ -203,6 +203,8 @@ pub struct Plan {
     pub c: f32,
     /// Radius of merges in the first pass; 0 where nothing is merged.
     pub merge_radius: f32,
+    /// Mean number of light vertices that are merged at once in the first pass.
+    pub crowd: f32,
     /// Reverse densities matter: both walkers take part in the weights.
     pub two_sided: bool,
     /// Hits and splats both make paths of length 1, each where it makes more of them.
@@ -242,6 +244,7 @@ impl Plan {
             n,
             c,
             merge_radius: if t.merge { settings.merge_radius.unwrap_or(0.0) } else { 0.0 },
+            crowd: 1.0,
             two_sided: light_paths > 0 && t.gathers(),
             shares_lamps: t.splat && t.hit,
             splat_direct: t.splat && !t.next_event,

@@ -65,7 +65,8 @@ pub fn emit<R: Record, O: Observe>(
         p: d.p_next,
         delta: false,
         focused: false,
-        may_merge: false,
+        clear: true,
+        merge: [0.0; 2],
         from: start.point.y,
         cos_from,
         parallel: start.infinite,
@@ -97,10 +98,13 @@ pub fn emit<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let partial = walk.partial(cx, arrival, vertex.focused, count);
+        let sums = walk.partial(cx, arrival, count);
+        let partial = sums.at(vertex.focused);
         let merges = walk.focused && !vertex.focused;
         if !vertex.closure.is_delta() {
             if plan.settings.techniques.splat && (length > 1 || plan.splat_direct) {
+                // From here to the eye there is nothing.
+                let partial = Partial { b: partial.b + if vertex.focused { sums.clear } else { 0.0 }, ..partial };
                 splat(cx, &walk, &vertex, partial, start, random, tally);
             }
             if let Some(cache) = cache.as_mut()
@@ -110,7 +114,7 @@ pub fn emit<R: Record, O: Observe>(
                 cache.push(LightVertex {
                     surface,
                     w_back: vertex.w_back,
-                    learned_back: vertex.learned_back(),
+                    by_material: if vertex.focused { sums.clear } else { vertex.learned_back() },
                     throughput: walk.throughput,
                     partial,
                     length: length as u16,
@@ -131,7 +135,7 @@ pub fn emit<R: Record, O: Observe>(
         let (u_lobe, u) = (random.axis(), random.axis2());
         let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
         tally.observe.scattered(&s);
-        walk.leave(cx, &vertex, arrival, partial, &s);
+        walk.leave(cx, EQUATION, &vertex, sums, &s);
         // Radiance is scaled by η² across a boundary, flux is not: roulette looks at flux.
         walk.eta = 1.0;
         walk.classify(&plan.settings.paths, EQUATION, s.delta);

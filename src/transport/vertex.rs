@@ -137,11 +137,11 @@ impl<'a> Vertex<'a> {
         if let Learned::Back(density) = self.learned { density } else { -1.0 }
     }
 
-    /// The vertex of a shooting walk once more, with what [`Self::learned_back`] told.
+    /// The vertex of a shooting walk once more; where not all events are focused, with what [`Self::learned_back`] told.
     #[inline]
     pub fn again(scene: &'a Scene, surface: Surface, w_back: Vec3, learned_back: f32) -> Self {
         let mut vertex = Self::new(scene, surface, w_back);
-        if learned_back >= 0.0 {
+        if learned_back >= 0.0 && !vertex.focused {
             vertex.learned = Learned::Back(learned_back);
         }
         vertex

@@ -6,7 +6,7 @@
 
 use super::cache::LightVertex;
 use super::class::{PathFilter, Positions, Symbol};
-use super::mis::Partial;
+use super::mis::{MergeCount, Partial};
 use super::mutant::{Mutant, planted};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
@@ -30,6 +30,8 @@ pub struct Context<'a> {
     pub merge_radius2: f32,
     /// η of this pass: light paths times the area in which their vertices are merged.
     pub eta: f32,
+    /// What a merge counts for in the weights.
+    pub merge: MergeCount<f32>,
     /// Part of what comes along chains of Dirac events (E S* L) that a sample counts: where several samples of chains
     /// belong to one gathering walk ([`super::chain::sample`]), one by their number.
     pub chain_part: f32,
@@ -40,7 +42,9 @@ impl<'a> Context<'a> {
     pub fn new(scene: &'a Scene, plan: &'a Plan, pass: u64) -> Self {
         let merge_radius2 = plan.merge_radius(pass).powi(2);
         let eta = plan.light_paths as f32 * std::f32::consts::PI * merge_radius2;
-        Self { scene, plan, merge_radius2, eta, chain_part: 1.0 }
+        // Of as many as are merged at once in the first pass, those in the area of this one.
+        let crowd = plan.crowd * merge_radius2 / plan.merge_radius(0).powi(2).max(f32::MIN_POSITIVE);
+        Self { scene, plan, merge_radius2, eta, merge: MergeCount::new(eta, crowd), chain_part: 1.0 }
     }
 
     /// The same where a pixel has so many samples of chains.
@@ -65,8 +69,11 @@ pub struct Walk {
     pub delta: bool,
     /// It did, or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
     pub focused: bool,
-    /// It did not, but the one before it did: a merge is possible there if the next event is focused.
-    pub may_merge: bool,
+    /// All events so far were focused, if there were any.
+    pub clear: bool,
+    /// What a merge behind adds to the MIS sum of the vertex that was left if the next event is focused (already raised): in
+    /// any case; and where from there to the eye all is focused, which the walker that comes from the eye knows itself.
+    pub merge: [f32; 2],
     /// Position of the vertex that was left.
     pub from: Vec3,
     /// Its geometric cosine towards the direction taken; 1 for a light at infinity.
@@ -105,6 +112,25 @@ pub struct Arrival {
     pub p_a: f32,
 }
 
+/// MIS sums on arrival at a vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct Sums {
+    /// Where the event at the vertex is not focused.
+    pub partial: Partial<f32>,
+    /// Where it is, merges behind it included.
+    pub focused: Partial<f32>,
+    /// What `b` is more by where in addition all is focused between it and the eye; 0 for the walker that comes from there.
+    pub clear: f32,
+}
+
+impl Sums {
+    /// For joins at a vertex of a material that is `focused` or not.
+    #[inline]
+    pub fn at(&self, focused: bool) -> Partial<f32> {
+        if focused { self.focused } else { self.partial }
+    }
+}
+
 /// Area densities are kept within these bounds so that no product over- or underflows.
 const DENSITY_RANGE: std::ops::RangeInclusive<f32> = 1e-30..=1e30;
 
@@ -118,40 +144,43 @@ impl Walk {
         Arrival { inv_d2, p_a }
     }
 
-    /// MIS sum of the vertex arrived at, of a material that is `focused` or not; `count` joins could have made
-    /// the edge.
+    /// MIS sum of the vertex arrived at; `count` joins could have made the edge.
     #[inline]
-    pub fn partial(&self, cx: Context<'_>, arrival: Arrival, focused: bool, count: f32) -> Partial<f32> {
+    pub fn partial(&self, cx: Context<'_>, arrival: Arrival, count: f32) -> Sums {
         let h = cx.plan.settings.heuristic;
-        let partial = Partial::arrive(h, count, arrival.p_a, self.cos_from * arrival.inv_d2, self.k);
-        if focused { self.with_merge(cx, arrival, partial) } else { partial }
-    }
-
-    /// Adds the merge at the vertex before, where there is one once the event here is known to be focused.
-    #[inline]
-    fn with_merge(&self, cx: Context<'_>, arrival: Arrival, partial: Partial<f32>) -> Partial<f32> {
-        if !self.may_merge || planted(Mutant::MergeWeight) {
-            return partial;
+        let j = self.cos_from * arrival.inv_d2;
+        let partial = Partial::arrive(h, count, arrival.p_a, j, self.k);
+        if self.merge == [0.0; 2] || planted(Mutant::MergeWeight) {
+            return Sums { partial, focused: partial, clear: 0.0 };
         }
-        partial.and_merge(cx.plan.settings.heuristic, cx.eta, arrival.p_a, self.cos_from * arrival.inv_d2)
+        let [any, clear] = self.merge;
+        let merged = |partial: Partial<f32>, sum| partial.and_merge(h, sum, arrival.p_a, j);
+        Sums { partial, focused: merged(partial, any), clear: merged(Partial { a: 0.0, b: 0.0 }, clear).b }
     }
 
-    /// Leaves `vertex` along a sampled direction.
+    /// Leaves a vertex along a sampled direction, `sums` those of [`Self::partial`] there.
     #[inline]
-    pub fn leave(&mut self, cx: Context<'_>, vertex: &Vertex<'_>, arrival: Arrival, mut partial: Partial<f32>, s: &Scatter) {
+    pub fn leave(&mut self, cx: Context<'_>, equation: Equation, vertex: &Vertex<'_>, sums: Sums, s: &Scatter) {
         let h = cx.plan.settings.heuristic;
         self.throughput *= s.weight;
         self.guided *= s.guided;
-        self.k = if s.delta {
-            // Where all events are focused, it was added on arrival.
-            if !vertex.focused {
-                partial = self.with_merge(cx, arrival, partial);
+        let resolved =
+            |partial: Partial<f32>| if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
+        self.k = resolved(if s.focused { sums.focused } else { sums.partial });
+        self.merge = if s.focused {
+            [0.0, resolved(Partial { a: 0.0, b: sums.clear })]
+        } else if self.focused {
+            match equation {
+                Equation::Rendering => [h.raise(cx.merge.at(self.clear)), 0.0],
+                Equation::Potential => {
+                    let any = h.raise(cx.merge.by_chance);
+                    [any, h.raise(cx.merge.clear) - any]
+                }
             }
-            partial.at_delta(h, s.p_rev, s.dirac_ratio)
         } else {
-            partial.at(h, s.p_rev)
+            [0.0; 2]
         };
-        self.may_merge = self.focused && !s.focused;
+        self.clear &= s.focused;
         self.focused = s.focused;
         self.p = s.p;
         self.delta = s.delta;

@@ -7,7 +7,7 @@ use nephroid::math::Random;
 use nephroid::math::random::Family;
 use nephroid::transport::cache::LightCache;
 use nephroid::transport::gather::gather;
-use nephroid::transport::mis::Heuristic;
+use nephroid::transport::mis::{Heuristic, MergeCount};
 use nephroid::transport::reference::{Densities, Testimony, Witness, weights, weights_by_recursion};
 use nephroid::transport::settings::{Plan, Settings, Techniques};
 use nephroid::transport::shoot::shoot;
@@ -48,12 +48,13 @@ fn recursion_is_the_definition_for_100_000_random_paths() {
     while tested < 100_000 {
         let (d, plan) = random_path(&mut random);
         let eta = f64::from(plan.light_paths) * std::f64::consts::PI * f64::from(plan.merge_radius(0)).powi(2);
-        let defined = weights(&d, &plan, eta);
+        let merge = MergeCount::new(eta, f64::from(random.unit() * 5.0).exp());
+        let defined = weights(&d, &plan, merge);
         let total: f64 = defined.iter().map(|w| w.1).sum();
         if total == 0.0 {
             continue;
         }
-        let recursive = weights_by_recursion(&d, &plan, eta);
+        let recursive = weights_by_recursion(&d, &plan, merge);
         assert_eq!(defined.len(), recursive.len());
         for ((key, a), (other, b)) in defined.iter().zip(&recursive) {
             assert_eq!(key, other);
@@ -70,6 +71,7 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
     let world = scene(xml);
     let film = world.film.clone();
     let plan = with_lessons(&world, settings, Plan::new(settings, 64, film.width * film.height, 2.0));
+    let plan = Plan { crowd: 20.0, ..plan };
     // One pass for all, so that one η belongs to all weights.
     let cx = Context::new(&world, &plan, 0);
     let (mut witness, mut rays) = (Witness::default(), RayCounts::default());
@@ -203,7 +205,7 @@ fn connections_know_the_merges_at_their_ends() {
         guided: false,
         ..Settings::default()
     };
-    let (world, plan, mut seen) = testimonies(&scenes::named(dir.path(), "nearly specular"), &settings, 20_000);
+    let (world, plan, mut seen) = testimonies(&scenes::named(dir.path(), "nearly specular"), &settings, 40_000);
     let merged = |t: &Testimony| t.path.weights(Context::new(&world, &plan, 0)).iter().any(|w| w.0.0 == Technique::Merge);
     seen.retain(|t| t.key.0 == Technique::Connect && merged(t));
     let bad = differing(&world, &plan, &seen);

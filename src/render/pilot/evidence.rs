@@ -281,7 +281,7 @@ fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square:
         return None;
     }
     let mut shares = [0.0; Technique::ALL.len()];
-    let joins = |plan: &Plan| products(&t.path.densities(cx.scene, plan), plan, f64::from(cx.eta));
+    let joins = |plan: &Plan| products(&t.path.densities(cx.scene, plan), plan, cx.merge.into());
     let total = |joins: &[(JoinKey, f64)]| joins.iter().map(|j| j.1).sum::<f64>();
     let found = joins(cx.plan);
     let density = total(&found);

@@ -66,6 +66,8 @@ pub struct Decisions {
     pub vertices_per_path: f64,
     /// Radius of merges in the first pass; 0 where there is nothing to merge.
     pub merge_radius: f32,
+    /// Mean number of light vertices that are merged at once in the first pass.
+    pub crowd: f32,
     /// Where light paths start.
     pub guide: Guide,
     /// Where gathering walks find light, if they are to go there.
@@ -107,6 +109,9 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
         if t.connect {
             decisions.vertices_per_path = found.vertices as f64 / f64::from(paths);
         }
+        if t.merge {
+            decisions.crowd = found.crowd;
+        }
         if settings.guided && t.shoots() {
             found.starts.iter().for_each(|(start, value)| learner.learn(start, *value));
             learner = learner.refined(&scene.lights);
@@ -132,7 +137,8 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
 
 impl Decisions {
     fn nothing(settings: &Settings) -> Self {
-        Self { settings: settings.clone(), vertices_per_path: 0.0, merge_radius: 0.0, guide: Guide::default(), incident: None }
+        let (vertices_per_path, merge_radius, crowd) = (0.0, 0.0, 1.0);
+        Self { settings: settings.clone(), vertices_per_path, merge_radius, crowd, guide: Guide::default(), incident: None }
     }
 
     /// The counts that follow for a render of the crop window `crop`.
@@ -141,7 +147,12 @@ impl Decisions {
         let film = scene.film.width.saturating_mul(scene.film.height);
         let settings = Settings { merge_radius: Some(self.merge_radius), ..self.settings.clone() };
         let incident = self.incident.clone();
-        Plan { guide: self.guide.clone(), incident, ..Plan::new(&settings, pixels, film, self.vertices_per_path) }
+        Plan {
+            guide: self.guide.clone(),
+            incident,
+            crowd: self.crowd,
+            ..Plan::new(&settings, pixels, film, self.vertices_per_path)
+        }
     }
 
     /// For the identity of a film: all that enters densities and weights and is not the scene's or the
@@ -152,6 +163,7 @@ impl Decisions {
         bytes.extend(self.settings.light_paths.unwrap_or(0).to_le_bytes());
         bytes.extend(self.vertices_per_path.to_bits().to_le_bytes());
         bytes.extend(self.merge_radius.to_bits().to_le_bytes());
+        bytes.extend(self.crowd.to_bits().to_le_bytes());
         bytes.extend(self.settings.faint.to_bits().to_le_bytes());
         bytes.extend(self.settings.chain_samples.to_le_bytes());
         bytes.push(u8::from(self.settings.guided_gathering));
@@ -233,16 +245,28 @@ impl Record for Splats<'_> {
 struct Joins<'a> {
     found: Vec<(f32, Technique, usize, u32)>,
     tracker: Tracker<'a>,
+    scene: &'a Scene,
+    /// The last event was focused.
+    focused: bool,
+    /// Vertices that merge with all around.
+    merging: u64,
 }
 impl Observe for Joins<'_> {
     fn started(&mut self, from: Vec3, light: Option<&Emission>) {
+        self.focused = false;
         self.tracker.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
+        self.merging += u64::from(self.focused && !self.scene.materials.is_focused(surface.material));
         self.tracker.arrived(surface);
     }
     fn scattered(&mut self, s: &Scatter) {
+        self.focused = s.focused;
         self.tracker.scattered(s);
+    }
+    fn followed(&mut self, _: f32) {
+        // Nothing is merged along branches of chains.
+        self.focused = false;
     }
     fn joined(&mut self, join: Join<'_>) {
         self.found.push((join.value.mean(), join.technique, join.light_vertex, self.tracker.last));
@@ -300,6 +324,8 @@ struct Shot {
 struct Round {
     /// Light vertices.
     vertices: u64,
+    /// How many a whole pass merges at once.
+    crowd: f32,
     /// What each light path that was of use is worth.
     starts: Vec<(Start, f64)>,
     /// Where light was found to arrive.
@@ -398,7 +424,7 @@ impl<'a> Pilot<'a> {
         let walks = if plan.settings.techniques.gathers() { (pixels * share).ceil() as u32 } else { 0 };
         // Connections and merges of the whole pass are estimated from the light vertices of this part.
         plan.inv_light_paths = 1.0 / paths as f32;
-        let gathered: Vec<(Vec<Seen>, Trail)> = (0..walks.div_ceil(JOB))
+        let gathered: Vec<(Vec<Seen>, Trail, [u64; 2])> = (0..walks.div_ceil(JOB))
             .into_par_iter()
             .map(|job| self.gather(&plan, round, (job, walks), (&cache, &owners, share as f32), goes))
             .collect();
@@ -407,17 +433,20 @@ impl<'a> Pilot<'a> {
         for s in &seen {
             self.image[s.cell as usize] += f64::from(s.value);
         }
-        for s in gathered.iter().flat_map(|(seen, _)| seen) {
+        let mut crowd = [0u64; 2];
+        for s in gathered.iter().flat_map(|(seen, ..)| seen) {
             self.image[s.cell as usize] += f64::from(s.value) * share / eye_share;
         }
-        for (found, steps) in gathered {
+        for (found, steps, merged) in gathered {
+            crowd = [0, 1].map(|i| crowd[i] + merged[i]);
             let offset = trail.append(steps);
             seen.extend(found.into_iter().map(|s| Seen { steps: [shifted(s.steps[0], offset), s.steps[1]], ..s }));
         }
         let squares = self.squares();
         let relative = |s: &Seen| f64::from(s.value) / squares[s.cell as usize].max(f64::MIN_POSITIVE).sqrt();
         let incident = trail.lessons(seen.iter().flat_map(|s| s.steps.map(|step| (step, relative(s)))));
-        Round { vertices: u64::from(cache.len()), starts: self.lessons(&squares, &seen, &starts), incident }
+        let crowd = (crowd[0] as f64 / (crowd[1].max(1) as f64 * share)) as f32;
+        Round { vertices: u64::from(cache.len()), crowd, starts: self.lessons(&squares, &seen, &starts), incident }
     }
 
     /// Square of the coarse image per pixel, and a little more, so that black parts do not outweigh all.
@@ -496,7 +525,8 @@ impl<'a> Pilot<'a> {
         Shot { seen: observe.seen, starts: observe.starts, vertices, owners, trail: observe.tracker.trail }
     }
 
-    /// Gathers on `walks` pixels, with the light vertices of `share` of a pass.
+    /// Gathers on `walks` pixels, with the light vertices of `share` of a pass; with what is seen and the trail, how many merges
+    /// there were at how many vertices.
     fn gather(
         &self,
         plan: &Plan,
@@ -504,10 +534,12 @@ impl<'a> Pilot<'a> {
         (job, walks): (u32, u32),
         (cache, owners, share): (&LightCache, &[(u32, u32)], f32),
         goes: bool,
-    ) -> (Vec<Seen>, Trail) {
+    ) -> (Vec<Seen>, Trail, [u64; 2]) {
         let cx = Context::new(self.scene, plan, 0);
         let (mut seen, mut rays) = (vec![], RayCounts::default());
-        let mut joins = Joins { found: vec![], tracker: Tracker::new(self.scene, plan.settings.techniques.next_event, goes) };
+        let tracker = Tracker::new(self.scene, plan.settings.techniques.next_event, goes);
+        let mut joins = Joins { found: vec![], tracker, scene: self.scene, focused: false, merging: 0 };
+        let mut merges = 0;
         for index in job * JOB..((job + 1) * JOB).min(walks) {
             // A walk's number beyond those of all light paths: the two never share a stream.
             let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 32, u64::from(round), plan.settings.seed);
@@ -519,6 +551,7 @@ impl<'a> Pilot<'a> {
             for (value, technique, vertex, step) in found.filter(|(value, ..)| value.is_finite()) {
                 // A whole pass connects each light vertex as often, since there are more of both walks; a
                 // merge finds the more gathering vertices, each to share with more light vertices.
+                merges += u64::from(technique == Technique::Merge);
                 let ((path, light_step), often) = match technique {
                     Technique::Connect => (owners[vertex], 1.0),
                     Technique::Merge => (owners[vertex], share),
@@ -527,6 +560,6 @@ impl<'a> Pilot<'a> {
                 seen.push(Seen { cell, value, path, often, steps: [step, light_step] });
             }
         }
-        (seen, joins.tracker.trail)
+        (seen, joins.tracker.trail, [merges, joins.merging])
     }
 }
