@@ -478,7 +478,8 @@ pub struct BenchArgs {
     /// Estimators.
     #[arg(short, long, value_delimiter = ',', value_name = "LIST", default_value = "gather,shoot,bidirectional")]
     pub estimators: Vec<String>,
-    /// A renderer that is not ours, on the same files: `mitsuba[:variant[:integrator]]` (repeatable).
+    /// A renderer that is not ours, on the same files: `mitsuba[:variant[:integrator]]`, or on a translation of them:
+    /// `luxcore[:engine]`, `cycles[:integrator]` (repeatable).
     #[arg(long, value_name = "PEER")]
     pub peer: Vec<String>,
     /// Times at which errors are compared, such as 5s,20s; runs end at the longest [default: 5s].

@@ -11,6 +11,7 @@ fn with_python(room: &Room, script: &str) -> (i32, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_nephroid"))
         .env("PATH", path)
         .env("NEPHROID_TEST_PEER", script)
+        .env_remove("NEPHROID_PYTHON")
         .arg("bench")
         .arg(room.path("ball.xml"))
         .args(["-e", "gather", "--peer", "mitsuba", "--spp", "2", "--runs", "4", "--reference-time", "1s", "-o"])
@@ -70,12 +71,39 @@ fn answers_of_a_peer_enter_the_tables() {
     assert!(verdict.contains("do not mean the same scene"), "{verdict}");
 }
 
+/// Whether the Python that the bench starts has a package.
+fn has(package: &str) -> bool {
+    let python = std::env::var_os("NEPHROID_PYTHON").unwrap_or_else(|| "python3".into());
+    let found = Command::new(python).args(["-c", &format!("import {package}")]).output();
+    let found = found.is_ok_and(|o| o.status.success());
+    if !found {
+        println!("skipped: Python has no package {package}");
+    }
+    found
+}
+
+/// Those that need a translation of the scene, where they are installed: it is the same scene.
+#[test]
+fn translated_scenes_are_the_same() {
+    for (package, peer) in [("pyluxcore", "luxcore:pathcpu"), ("bpy", "cycles:path")] {
+        if !has(package) {
+            continue;
+        }
+        let room = Room::new();
+        let arguments = ["-e", "gather", "--peer", peer, "--spp", "16,256", "--runs", "4", "--reference-time", "4s"];
+        let (code, err) = room.bench(&arguments);
+        assert_eq!(code, 0, "{peer}: {err}");
+        let report = room.report();
+        let light = |k: usize| contender(&report, k)["summary"]["energy"]["value"].as_f64().unwrap();
+        assert!((light(1) / light(0) - 1.0).abs() < 0.02, "{peer}: {} {}", light(0), light(1));
+    }
+}
+
 /// The real one, where there is one: it means the same scene.
 #[test]
 fn mitsuba_means_the_same_scene() {
-    let found = Command::new("python3").args(["-c", "import mitsuba"]).output().is_ok_and(|o| o.status.success());
-    if !found {
-        return println!("skipped: the Python on the PATH has no package mitsuba");
+    if !has("mitsuba") {
+        return;
     }
     let room = Room::new();
     let arguments = ["-e", "gather,shoot", "--peer", "mitsuba", "--peer", "mitsuba:scalar_rgb:ptracer"];

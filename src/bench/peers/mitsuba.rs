@@ -1,13 +1,10 @@
 //! Mitsuba 3 by its Python package. (Its command line waits for ever with fewer than three threads.)
 
-use super::Job;
 use super::process::Process;
-use crate::bench::size;
-use serde_json::json;
-use std::process::Command;
+use super::{Job, one_of};
 
 /// Reads the job, renders; speaks the lines of [`super::process`].
-const SCRIPT: &str = include_str!("mitsuba.py");
+const SCRIPT: &[&str] = &[include_str!("mitsuba.py")];
 
 /// Integrators that are compared, with the estimator of ours that sees the same paths.
 const INTEGRATORS: [(&str, &str); 2] = [("path", "gather"), ("ptracer", "shoot")];
@@ -23,9 +20,7 @@ pub fn complete(options: &[String]) -> Result<Vec<String>, String> {
         [v, i] => [v.as_str(), i.as_str()],
         _ => return Err("too many options".into()),
     };
-    if !INTEGRATORS.iter().any(|i| i.0 == integrator) {
-        return Err(format!("unknown integrator `{integrator}` (known: {})", INTEGRATORS.map(|i| i.0).join(", ")));
-    }
+    one_of("integrator", integrator, &INTEGRATORS.map(|i| i.0))?;
     let variant = if variant.is_empty() { VARIANT } else { variant };
     Ok(vec![variant.to_owned(), integrator.to_owned()])
 }
@@ -33,26 +28,9 @@ pub fn complete(options: &[String]) -> Result<Vec<String>, String> {
 /// Loads the scene and compiles what has to be compiled.
 pub fn start(options: &[String], job: &Job<'_, '_>) -> Result<Process, String> {
     let [variant, integrator] = options else { return Err("a variant and an integrator are needed".into()) };
-    let scene = job.subject.scene;
-    let path = std::fs::canonicalize(job.subject.path).map_err(|e| e.to_string())?;
-    let define: serde_json::Map<_, _> = job.define.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
-    let setup = json!({
-        "scene": path.to_str().ok_or("the name of the scene is not UTF-8")?,
-        "define": define,
-        "variant": variant,
-        "integrator": integrator,
-        "threads": job.threads,
-        "size": size(scene),
-        "max_depth": scene.integrator.max_depth.map_or(-1, i64::from),
-        "rr_depth": scene.integrator.rr_depth,
-        "hide_emitters": scene.integrator.hide_emitters,
-    });
-    let mut command = Command::new("python3");
-    command.arg("-c").arg(SCRIPT);
-    let like = INTEGRATORS.iter().find(|i| i.0 == integrator.as_str()).map(|i| i.1);
-    let mut process = Process::start(&mut command, format!("mitsuba:{variant}:{integrator}"), size(scene), &setup)?;
-    process.like = like;
-    let version = process.ready["version"].as_str().unwrap_or("of unknown version").to_owned();
-    process.remark = format!("Mitsuba {version}, loading and compiling not counted.");
+    let name = format!("mitsuba:{variant}:{integrator}");
+    let mut process = job.start(name, "Mitsuba", SCRIPT, &[("variant", variant), ("integrator", integrator)])?;
+    process.like = INTEGRATORS.iter().find(|i| i.0 == integrator.as_str()).map(|i| i.1);
+    process.remark += ", loading and compiling not counted.";
     Ok(process)
 }

@@ -2,13 +2,20 @@
 //!
 //! A peer is a program that speaks lines of JSON ([`process`]): it is told a scene once and a run at a time,
 //! and answers with an image at every mark. A new one is a script, a file like [`mitsuba`] that starts it, and
-//! a line in `PEERS`.
+//! a line in `PEERS`. Peers that do not read Mitsuba's scenes get theirs from `translate.py`, which refuses what it does not know.
 
+pub mod cycles;
+pub mod luxcore;
 pub mod mitsuba;
 pub mod process;
 
-use super::Subject;
+use super::{Subject, size};
 use process::Process;
+use serde_json::json;
+use std::process::Command;
+
+/// Names the Python that has the peers' packages, where `python3` has not.
+const PYTHON: &str = "NEPHROID_PYTHON";
 
 /// A peer with its options, as on the command line: `mitsuba:llvm_ad_rgb:path`.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,8 +37,11 @@ pub struct Kind {
 }
 
 /// All of them.
-const PEERS: [Kind; 1] =
-    [Kind { name: "mitsuba", usage: "mitsuba[:variant[:integrator]]", complete: mitsuba::complete, start: mitsuba::start }];
+const PEERS: [Kind; 3] = [
+    Kind { name: "mitsuba", usage: "mitsuba[:variant[:integrator]]", complete: mitsuba::complete, start: mitsuba::start },
+    Kind { name: "luxcore", usage: "luxcore[:engine]", complete: luxcore::complete, start: luxcore::start },
+    Kind { name: "cycles", usage: "cycles[:integrator]", complete: cycles::complete, start: cycles::start },
+];
 
 /// What a peer has to render.
 pub struct Job<'a, 's> {
@@ -41,6 +51,42 @@ pub struct Job<'a, 's> {
     pub define: &'a [(String, String)],
     /// Threads.
     pub threads: usize,
+}
+
+impl Job<'_, '_> {
+    /// Starts a script by Python with the setup that all have in common and its own `options`. `program` is how its remark
+    /// begins, with the version and what it says it renders only nearly.
+    fn start(&self, name: String, program: &str, script: &[&str], options: &[(&str, &str)]) -> Result<Process, String> {
+        let scene = self.subject.scene;
+        let path = std::fs::canonicalize(self.subject.path).map_err(|e| e.to_string())?;
+        let define: serde_json::Map<_, _> = self.define.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
+        let mut setup = json!({
+            "scene": path.to_str().ok_or("the name of the scene is not UTF-8")?,
+            "define": define,
+            "threads": self.threads,
+            "size": size(scene),
+            "max_depth": scene.integrator.max_depth.map_or(-1, i64::from),
+            "rr_depth": scene.integrator.rr_depth,
+            "hide_emitters": scene.integrator.hide_emitters,
+        });
+        for (key, value) in options {
+            setup[*key] = json!(value);
+        }
+        let mut command = Command::new(std::env::var_os(PYTHON).unwrap_or_else(|| "python3".into()));
+        command.arg("-c").arg(script.join("\n"));
+        let mut process = Process::start(&mut command, name, size(scene), &setup)?;
+        let version = process.ready["version"].as_str().unwrap_or("of unknown version");
+        let nearly = process.ready["approximations"].as_array().into_iter().flatten().filter_map(|a| a.as_str());
+        let nearly = nearly.collect::<Vec<_>>().join("; ");
+        let nearly = if nearly.is_empty() { nearly } else { format!(" (only similar: {nearly})") };
+        process.remark = format!("{program} {version}{nearly}");
+        Ok(process)
+    }
+}
+
+/// Whether a peer knows an option; the sentence has those that it knows.
+fn one_of(what: &str, name: &str, known: &[&str]) -> Result<(), String> {
+    if known.contains(&name) { Ok(()) } else { Err(format!("unknown {what} `{name}` (known: {})", known.join(", "))) }
 }
 
 impl Peer {
@@ -79,5 +125,9 @@ mod tests {
         assert!(Peer::parse("mitsuba:scalar_rgb:bdpt").unwrap_err().contains("ptracer"));
         assert!(Peer::parse("mitsuba:a:path:c").is_err());
         assert!(Peer::parse("povray").unwrap_err().contains("mitsuba[:variant"));
+        assert_eq!(Peer::parse("luxcore").unwrap().name(), "luxcore:BIDIRCPU");
+        assert_eq!(Peer::parse("luxcore:pathcpu").unwrap().name(), "luxcore:PATHCPU");
+        assert_eq!(Peer::parse("cycles").unwrap().name(), "cycles:path");
+        assert!(Peer::parse("cycles:manifold").unwrap_err().contains("mnee"));
     }
 }
