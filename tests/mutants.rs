@@ -10,6 +10,9 @@ mod mirrors;
 #[path = "physics/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
+#[path = "physics/splits.rs"]
+#[allow(dead_code)]
+mod splits;
 #[path = "physics/support.rs"]
 #[allow(dead_code)]
 mod support;
@@ -212,6 +215,23 @@ fn planted_mistakes_multiply_chains() {
         agreement(&one, &many).p
     });
     println!("ChainPart: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
+    assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
+}
+
+/// `splits::walks_that_split_keep_every_expectation` notices ways that count in full.
+#[test]
+fn planted_mistakes_split_in_full() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), "glass and mirror"));
+    let chosen = splits::gathered(&world, false, 0);
+    let [sound, mistaken] = [None, Some(Mutant::SplitInFull)].map(|m| {
+        plant(m);
+        let split = splits::gathered(&world, true, 50);
+        plant(None);
+        (2..=6).map(|k| agreement(&chosen[k], &split[k]).p).fold(1.0, f64::min)
+    });
+    println!("SplitInFull: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
     assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
 }
 

@@ -399,6 +399,7 @@ impl Job<'_> {
             "guided": set.guided,
             "guided_gathering": render.plan().incident.is_some(),
             "survival": set.survival,
+            "faintest_split": set.faintest_split,
             "faint_branches": set.faint,
             "chain_samples": 1 + render.plan().more_chains(),
             "stratified": set.stratified,

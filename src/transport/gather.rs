@@ -10,7 +10,8 @@ use super::class::{Finished, Positions, Symbol};
 use super::lamp;
 use super::mis::{self, Partial};
 use super::mutant::{Mutant, planted};
-use super::vertex::Vertex;
+use super::split::{Other, Others, both_ways};
+use super::vertex::{Scatter, Vertex};
 use super::walk::{Arrival, Chain, Context, Join, Observe, Tally, Walk, end, sees_light, spawn};
 use super::{Contribution, Record, Technique};
 use crate::local::Equation;
@@ -55,10 +56,10 @@ pub fn follow<R: Record, O: Observe>(
     let (scene, plan) = (cx.scene, cx.plan);
     tally.rays.gather_walks += 1;
     tally.observe.started(start.lens, None);
-    let mut ray = Ray { o: start.o, d: start.d, t_max: start.t_max };
+    let ray = Ray { o: start.o, d: start.d, t_max: start.t_max };
     // A ray that is none of the sensor's has no density by it; where such a ray may start, none is asked for.
     let p_sensor = scene.sensor.density(start.d);
-    let mut walk = Walk {
+    let walk = Walk {
         throughput: Spectrum::ONE * weight,
         guided: 1.0,
         k: 0.0,
@@ -76,6 +77,24 @@ pub fn follow<R: Record, O: Observe>(
         first_delta: false,
         chain: if plan.settings.follows_chains() { Chain::Single } else { Chain::Ended },
     };
+    let (mut next, mut others) = (Some((walk, ray)), Others::default());
+    while let Some(way) = next {
+        go_on(cx, way, (weight, lights), &mut others, random, tally);
+        next = others.pop(tally.observe);
+    }
+}
+
+/// Follows a walk, which began with `weight`, to its end; where it splits, the other ways wait among `others`.
+#[inline]
+fn go_on<R: Record, O: Observe>(
+    cx: Context<'_>,
+    (mut walk, mut ray): (Walk, Ray),
+    (weight, lights): (f32, &LightCache),
+    others: &mut Others,
+    random: &mut Random,
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
     loop {
         tally.rays.gather += 1;
         // Light vertices lie all over memory: the first is asked for while the ray is on its way.
@@ -122,14 +141,25 @@ pub fn follow<R: Record, O: Observe>(
             walk.chain = Chain::Branched;
         }
         let (u, u_lobe) = (random.axis2(), random.axis());
-        let Some(s) = vertex.scatter(EQUATION, u_lobe, u) else { return };
+        let mut leaves = |walk: &mut Walk, s: &Scatter| {
+            walk.leave(cx, EQUATION, &vertex, sums, s);
+            walk.classify(&plan.settings.paths, EQUATION, s.delta);
+            walk.survives(plan, 1.0 / plan.settings.survival, random).then(|| spawn(&vertex.surface, s.w_next))
+        };
+        let s = match both_ways(cx, &walk, &vertex, weight, others) {
+            Some([s, event]) => {
+                let mut other = walk.clone();
+                if let Some(ray) = leaves(&mut other, &event) {
+                    others.push(Other { walk: other, ray, surface: vertex.surface, event });
+                }
+                Some(s)
+            }
+            None => vertex.scatter(EQUATION, u_lobe, u),
+        };
+        let Some(s) = s else { return };
         tally.observe.scattered(&s);
-        walk.leave(cx, EQUATION, &vertex, sums, &s);
-        walk.classify(&plan.settings.paths, EQUATION, s.delta);
-        if !walk.survives(plan, 1.0 / plan.settings.survival, random) {
-            return;
-        }
-        ray = spawn(&vertex.surface, s.w_next);
+        let Some(next) = leaves(&mut walk, &s) else { return };
+        ray = next;
     }
 }
 

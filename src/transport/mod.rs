@@ -17,6 +17,7 @@
 //! - `lamp`: paths without a vertex between, lamps seen directly.
 //! - [`recursive`]: part of the coupling, or none: recursive ray tracing, local illumination.
 //! - [`chain`], [`branch`]: Dirac events followed in all directions, beside a gathering walk.
+//! - [`split`]: a gathering walk that goes both ways where it sees glass.
 //! - [`incident`]: where light comes from, as learned, for gathering walks to go there.
 //! - [`cache`], [`merge`]: light vertices kept for connections and merges.
 //! - [`mod@reference`]: the same weights the slow way, for tests.
@@ -35,6 +36,7 @@ pub mod recursive;
 pub mod reference;
 pub mod settings;
 pub mod shoot;
+pub mod split;
 pub mod vertex;
 pub mod walk;
 

@@ -30,6 +30,8 @@ pub enum Mutant {
     LampTwice = 11,
     /// The shooting walker does not know that gathering goes where light comes from.
     LearnedDensity = 12,
+    /// Where a walk splits, both ways count in full.
+    SplitInFull = 13,
 }
 
 #[cfg(feature = "mutants")]

@@ -102,6 +102,9 @@ pub const FAINT: f32 = 1e-2;
 /// The value with which no branches are followed.
 pub const NO_BRANCHES: f32 = 1.0;
 
+/// The value of [`Settings::faintest_split`] with which walks do not split.
+pub const NO_SPLITS: f32 = 1.0;
+
 /// Everything that decides what is estimated and by which joins.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -140,6 +143,9 @@ pub struct Settings {
     /// Samples of chains of Dirac events between eye and light (E S* L) per pixel and pass, where branches are followed:
     /// nothing but a hit finds them, so a reflection of a lamp that is smaller than a pixel needs many.
     pub chain_samples: u32,
+    /// Where branches are followed and a gathering walk that came by Dirac events alone has two ways on, it takes both if the
+    /// fainter carries at least this share of the pixel ([`super::split`]); [`NO_SPLITS`]: one at random.
+    pub faintest_split: f32,
     /// Classes of paths that count.
     pub paths: PathFilter,
     /// Walks fill the space of their first decisions evenly.
@@ -182,6 +188,7 @@ impl Default for Settings {
             guided_gathering: false,
             faint: FAINT,
             chain_samples: 1,
+            faintest_split: NO_SPLITS,
             paths: PathFilter::default(),
             stratified: true,
             seed: 0,

@@ -13,5 +13,6 @@ mod merging;
 mod mirrors;
 mod scenes;
 mod splats;
+mod splits;
 mod support;
 mod weights;

@@ -23,7 +23,7 @@ use crate::scene::{Scene, Surface};
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::{follow, gather};
 use crate::transport::incident::{Incident, Lesson};
-use crate::transport::settings::{Coupling, NO_BRANCHES, Plan, Settings, Techniques};
+use crate::transport::settings::{Coupling, NO_BRANCHES, NO_SPLITS, Plan, Settings, Techniques};
 use crate::transport::shoot::shoot;
 use crate::transport::vertex::Scatter;
 use crate::transport::walk::{Context, Join, Observe, Tally};
@@ -264,6 +264,11 @@ impl Observe for Joins<'_> {
         self.focused = s.focused;
         self.tracker.scattered(s);
     }
+    fn returned(&mut self, _: usize) {
+        // To a vertex that only Dirac events led to: no step was made there.
+        self.focused = false;
+        self.tracker.last = NONE;
+    }
     fn followed(&mut self, _: f32) {
         // Nothing is merged along branches of chains.
         self.focused = false;
@@ -348,7 +353,7 @@ impl<'a> Pilot<'a> {
     /// can be merged, so that merging blurs less than the film does.
     fn merge_radius(&self) -> f32 {
         let techniques = Techniques { next_event: false, ..Techniques::GATHER };
-        let settings = Settings { techniques, faint: NO_BRANCHES, ..self.settings.clone() };
+        let settings = Settings { techniques, faint: NO_BRANCHES, faintest_split: NO_SPLITS, ..self.settings.clone() };
         let plan = Plan::new(&settings, 1, 1, 0.0);
         let jobs = (0..SCOUTS / JOB).into_par_iter().map(|job| {
             let mut footprints = Footprints { parallel: self.scene.sensor.is_orthographic(), ..Footprints::default() };
