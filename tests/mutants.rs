@@ -10,9 +10,6 @@ mod mirrors;
 #[path = "physics/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
-#[path = "physics/splits.rs"]
-#[allow(dead_code)]
-mod splits;
 #[path = "physics/support.rs"]
 #[allow(dead_code)]
 mod support;
@@ -23,7 +20,7 @@ use nephroid::render::{Estimator, Options};
 use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
-use nephroid::transport::settings::{FAINT, NO_BRANCHES, Settings, Techniques};
+use nephroid::transport::settings::{FAINT, NO_BRANCHES, NO_SPLITS, Settings, Techniques};
 use support::{Effort, pictures, scene, seed, series};
 
 /// A mistake is planted for the whole process.
@@ -224,10 +221,15 @@ fn planted_mistakes_split_in_full() {
     let _alone = ONE_AT_A_TIME.lock().unwrap();
     let dir = tempfile::tempdir().unwrap();
     let world = scene(&scenes::named(dir.path(), "glass and mirror"));
-    let chosen = splits::gathered(&world, false, 0);
+    let gathered = |faintest_split: f32, first: u64| {
+        let (techniques, seed) = (Techniques::GATHER, seed() * 1000 + first);
+        let settings = Settings { techniques, min_length: 2, rr_depth: 3, faintest_split, seed, ..Settings::default() };
+        series(&world, &settings, Effort { renders: 40, passes: 3, max_length: 6 })
+    };
+    let chosen = gathered(NO_SPLITS, 0);
     let [sound, mistaken] = [None, Some(Mutant::SplitInFull)].map(|m| {
         plant(m);
-        let split = splits::gathered(&world, true, 50);
+        let split = gathered(1e-4, 50);
         plant(None);
         (2..=6).map(|k| agreement(&chosen[k], &split[k]).p).fold(1.0, f64::min)
     });

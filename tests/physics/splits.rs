@@ -8,12 +8,12 @@ use nephroid::scene::Scene;
 use nephroid::transport::settings::{NO_SPLITS, Settings, Techniques};
 
 /// Splits, three levels deep, or chooses.
-pub fn settings(splits: bool) -> Settings {
+fn settings(splits: bool) -> Settings {
     Settings { rr_depth: 3, faintest_split: if splits { 1e-4 } else { NO_SPLITS }, ..Settings::default() }
 }
 
 /// Hits and next events per path length.
-pub fn gathered(world: &Scene, splits: bool, first: u64) -> Vec<BlockSeries> {
+fn gathered(world: &Scene, splits: bool, first: u64) -> Vec<BlockSeries> {
     let effort = Effort { renders: 40, passes: 3, max_length: 6 };
     let seed = seed() * 1000 + first;
     series(world, &Settings { techniques: Techniques::GATHER, min_length: 2, seed, ..settings(splits) }, effort)
