@@ -136,7 +136,7 @@ pub enum TechniqueName {
     Splat,
     /// A gathering vertex is joined to a shooting vertex.
     Connect,
-    /// Vertices of both walkers near each other count as one, between mirrors or smooth glass; consistent.
+    /// Vertices of both walkers near each other count as one, where mirrors or smooth glass throw light; consistent.
     Merge,
 }
 

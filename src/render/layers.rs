@@ -126,7 +126,7 @@ impl Joins {
                 };
                 out.push(t, Join { length, light_vertices: Some(s), technique });
             }
-            // A merged vertex has a focused event on both sides, so s and t are 3 at least.
+            // A merged vertex has an event on both sides, so s and t are 3 at least.
             for s in 3..length {
                 out.push(t, Join { length, light_vertices: Some(s), technique: Technique::Merge });
             }

@@ -3,8 +3,8 @@
 //! With Dirac events S (mirrors, smooth glass) and other events D, and a light L that is a Dirac one
 //! (point, spot, parallel) or not, a path `E … L` is made by a *hit* if the light is not Dirac, by a
 //! *next event* if its last event is D, by a *splat* if its first event is D, by a *connection* if
-//! two neighbouring events are both D [Veach 1997, §8.3], by a *merge* if a D stands between two S. What none of an estimator's joins makes is
-//! missing from its image: no number of samples brings it back.
+//! two neighbouring events are both D [Veach 1997, §8.3], by a *merge* if an S follows a D that is not the first
+//! event. What none of an estimator's joins makes is missing from its image: no number of samples brings it back.
 //!
 //! A class ends in S, then L: a hit finds such a light only if a direction chosen at the last D happens
 //! to lead there, which is rare for small lights; the table says "by luck".
@@ -122,7 +122,7 @@ pub fn joins(events: &[Symbol], ends: Ends) -> Joins {
         next_event: last.into(),
         connect: events.windows(2).any(|w| w == [Symbol::D, Symbol::D]).into(),
         splat: (first || direct).into(),
-        merge: events.windows(3).any(|w| w == [Symbol::S, Symbol::D, Symbol::S]).into(),
+        merge: events.windows(3).any(|w| w[1..] == [Symbol::D, Symbol::S]).into(),
     }
 }
 
@@ -318,8 +318,8 @@ mod tests {
             ("E S D L", [Yes, No, Yes, No, No, No]),
             ("E D S L", [ByLuck, No, No, No, Yes, No]),
             ("E D S D L", [Yes, No, Yes, No, Yes, No]),
-            ("E D D S L", [ByLuck, No, No, Yes, Yes, No]),
-            ("E S D D S L", [ByLuck, No, No, Yes, No, No]),
+            ("E D D S L", [ByLuck, No, No, Yes, Yes, Yes]),
+            ("E S D D S L", [ByLuck, No, No, Yes, No, Yes]),
             ("E S D S L", [ByLuck, No, No, No, No, Yes]),
             ("E S S L", [Yes, No, No, No, No, No]),
         ];

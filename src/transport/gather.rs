@@ -130,7 +130,7 @@ fn go_on<R: Record, O: Observe>(
             if let Some(picked) = picked {
                 connect(cx, &walk, &vertex, partial, (lights, picked), random, tally);
             }
-            if walk.focused && !vertex.focused && cx.merge_radius2 > 0.0 {
+            if walk.length > 0 && !vertex.focused && cx.merge_radius2 > 0.0 {
                 merge(cx, &walk, &vertex, partial, lights, tally);
             }
         }
@@ -397,11 +397,12 @@ fn connect<R: Record, O: Observe>(
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
         // A merge at either end exists only where the other end is focused.
-        let merged = |possible: bool| if possible { h.raise(cx.merge.at(walk.clear)) } else { 0.0 };
-        let at_eye = merged(walk.focused && !vertex.focused && light.focused);
-        let at_light = merged(y.merges && vertex.focused);
+        let merged = |possible: bool, clear: bool| if possible { h.raise(cx.merge.at(clear)) } else { 0.0 };
+        let clear = walk.clear && vertex.focused;
+        let at_eye = merged(walk.length > 0 && !vertex.focused && light.focused, walk.clear);
+        let at_light = merged(y.merges, clear);
         let mut behind = y.partial;
-        if light.focused && vertex.focused && walk.clear {
+        if light.focused && clear {
             behind.b += y.by_material;
         }
         let weight = mis::connect(

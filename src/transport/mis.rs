@@ -19,11 +19,13 @@
 //!
 //! A *merge* at v_i counts a shooting vertex within a radius r as the same vertex: its density is
 //! η G_i S_i with η = Nπr², so 1 over its weight is 1 + (K_i + H_i)/η [Georgiev 2012; Hachisuka
-//! 2012]. Merges are made only between two focused events (Dirac events, or of a material that is nearly a mirror or
-//! clear glass), where hardly any other join finds anything; that is a property of the path, so weights remain a
-//! partition. A walker learns at the event after v_i that the merge at v_i exists, and adds its term there.
+//! 2012]. Merges are made only where v_{i+1} is a focused event (a Dirac event, or of a material that is nearly a mirror or
+//! clear glass), which next events and mostly hits are blind to, and not at v_1, where splats see it without blur; that is a property of the
+//! path, so weights remain a partition. The gathering walker learns at the event after v_i that the merge at v_i exists,
+//! and adds its term there.
 //!
-//! A gathering walk that comes upon a caustic by chance merges all of it at once. By its density a merge would seem
+//! Two vertices in a corner that light reaches by way of a caustic are badly joined by a connection, whose 1/d² nothing bounds;
+//! a merge at the second is not. But a gathering walk that comes upon a caustic by chance merges all of it at once. By its density a merge would seem
 //! the best of all joins there, though all that is merged shares the one chance [cf. Grittmann 2021]: so it counts
 //! for less where not all events between it and the eye are focused ([`MergeCount`]). The shooting walker does not know that before
 //! the eye is reached, and carries the difference apart.

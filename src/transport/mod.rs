@@ -5,7 +5,7 @@
 //! subpaths into whole paths: a *hit* (the gathering walk arrives on a light), a *next event* (it
 //! picks a light point), a *splat* (the shooting walk is seen by the lens), a *connection* (a
 //! vertex of one is joined to a vertex of the other) and a *merge* (vertices of both are so near to
-//! each other that they count as one; only between focused events). Each path is weighted by multiple importance
+//! each other that they count as one; only in caustics that are not seen directly). Each path is weighted by multiple importance
 //! sampling over all joins that could have made it ([`mis`]).
 //!
 //! - [`settings`]: which joins, how many of each, which paths.
@@ -57,7 +57,7 @@ pub enum Technique {
     Connect,
     /// A shooting vertex (or a light point) was seen by the lens: t = 1.
     Splat,
-    /// A gathering vertex and a shooting vertex near it count as one, between focused events.
+    /// A gathering vertex and a shooting vertex near it count as one, behind a focused event from the light.
     Merge,
 }
 

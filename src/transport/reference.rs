@@ -186,9 +186,9 @@ pub fn weights(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinK
     joins
 }
 
-/// What a merge at v_i counts for: 0 where there is none, since it is not between two focused events or is one itself.
+/// What a merge at v_i counts for: 0 where there is none, since it is seen directly, is focused itself, or lit by what is not.
 fn merged_at(d: &Densities, i: usize, merge: MergeCount<f64>) -> f64 {
-    let possible = i > 1 && d.focused[i - 1] && !d.focused[i] && d.focused[i + 1];
+    let possible = i > 1 && !d.focused[i] && d.focused[i + 1];
     if possible { merge.at(d.focused[1..i].iter().all(|f| *f)) } else { 0.0 }
 }
 

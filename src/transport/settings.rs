@@ -19,8 +19,8 @@ pub struct Techniques {
     pub splat: bool,
     /// Gathering vertices are joined to shooting vertices.
     pub connect: bool,
-    /// Gathering vertices between focused events (Dirac or nearly so) are merged with shooting vertices near them: biased by
-    /// a radius that shrinks from pass to pass, so consistent.
+    /// Gathering vertices that are not seen directly are merged with shooting vertices near them that focused events (Dirac or
+    /// nearly so) lead to: biased by a radius that shrinks from pass to pass, so consistent.
     pub merge: bool,
 }
 

@@ -71,8 +71,8 @@ pub struct Walk {
     pub focused: bool,
     /// All events so far were focused, if there were any.
     pub clear: bool,
-    /// What a merge behind adds to the MIS sum of the vertex that was left if the next event is focused (already raised): in
-    /// any case; and where from there to the eye all is focused, which the walker that comes from the eye knows itself.
+    /// What a merge behind adds to the MIS sum of the vertex that was left if the next event is focused (already raised): of the
+    /// gathering walker; and of the shooting walker, where in addition from there to the eye all is focused.
     pub merge: [f32; 2],
     /// Position of the vertex that was left.
     pub from: Vec3,
@@ -167,18 +167,17 @@ impl Walk {
         let resolved =
             |partial: Partial<f32>| if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
         self.k = resolved(if s.focused { sums.focused } else { sums.partial });
-        self.merge = if s.focused {
-            [0.0, resolved(Partial { a: 0.0, b: sums.clear })]
-        } else if self.focused {
-            match equation {
-                Equation::Rendering => [h.raise(cx.merge.at(self.clear)), 0.0],
-                Equation::Potential => {
-                    let any = h.raise(cx.merge.by_chance);
-                    [any, h.raise(cx.merge.clear) - any]
-                }
+        self.merge = match equation {
+            _ if s.focused => [0.0, resolved(Partial { a: 0.0, b: sums.clear })],
+            // From the eye, there is a merge here if the next event is focused.
+            Equation::Rendering if self.length > 0 => [h.raise(cx.merge.at(self.clear)), 0.0],
+            // From the light, if that was so before, and it counts for more if all that comes is.
+            Equation::Potential if self.focused && !planted(Mutant::MergeWeight) => {
+                let by_chance = h.raise(cx.merge.by_chance);
+                self.k += by_chance;
+                [0.0, h.raise(cx.merge.clear) - by_chance]
             }
-        } else {
-            [0.0; 2]
+            _ => [0.0; 2],
         };
         self.clear &= s.focused;
         self.focused = s.focused;

@@ -246,32 +246,32 @@ struct Joins<'a> {
     found: Vec<(f32, Technique, usize, u32)>,
     tracker: Tracker<'a>,
     scene: &'a Scene,
-    /// The last event was focused.
-    focused: bool,
+    /// There were events.
+    goes_on: bool,
     /// Vertices that merge with all around.
     merging: u64,
 }
 impl Observe for Joins<'_> {
     fn started(&mut self, from: Vec3, light: Option<&Emission>) {
-        self.focused = false;
+        self.goes_on = false;
         self.tracker.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
-        self.merging += u64::from(self.focused && !self.scene.materials.is_focused(surface.material));
+        self.merging += u64::from(self.goes_on && !self.scene.materials.is_focused(surface.material));
         self.tracker.arrived(surface);
     }
     fn scattered(&mut self, s: &Scatter) {
-        self.focused = s.focused;
+        self.goes_on = true;
         self.tracker.scattered(s);
     }
     fn returned(&mut self, _: usize) {
         // To a vertex that only Dirac events led to: no step was made there.
-        self.focused = false;
+        self.goes_on = false;
         self.tracker.last = NONE;
     }
     fn followed(&mut self, _: f32) {
         // Nothing is merged along branches of chains.
-        self.focused = false;
+        self.goes_on = false;
     }
     fn joined(&mut self, join: Join<'_>) {
         self.found.push((join.value.mean(), join.technique, join.light_vertex, self.tracker.last));
@@ -543,7 +543,7 @@ impl<'a> Pilot<'a> {
         let cx = Context::new(self.scene, plan, 0);
         let (mut seen, mut rays) = (vec![], RayCounts::default());
         let tracker = Tracker::new(self.scene, plan.settings.techniques.next_event, goes);
-        let mut joins = Joins { found: vec![], tracker, scene: self.scene, focused: false, merging: 0 };
+        let mut joins = Joins { found: vec![], tracker, scene: self.scene, goes_on: false, merging: 0 };
         let mut merges = 0;
         for index in job * JOB..((job + 1) * JOB).min(walks) {
             // A walk's number beyond those of all light paths: the two never share a stream.
