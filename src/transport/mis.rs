@@ -26,7 +26,7 @@
 //!
 //! Two vertices in a corner that light reaches by way of a caustic are badly joined by a connection, whose 1/d² nothing bounds;
 //! a merge at the second is not. But a gathering walk that comes upon a caustic by chance merges all of it at once. By its density a merge would seem
-//! the best of all joins there, though all that is merged shares the one chance [cf. Grittmann 2021]: so it counts
+//! the best of all joins there, though all that is merged shares the one chance [Grittmann 2021]: so it counts
 //! for less where not all events between it and the eye are focused ([`MergeCount`]). The shooting walker does not know that before
 //! the eye is reached, and carries the difference apart.
 //!
