@@ -31,7 +31,7 @@ pub struct LightVertex {
     pub first_delta: bool,
     /// Where the light comes from.
     pub emitter: EmitterId,
-    /// Reached by a focused event, and none itself: merges may end here.
+    /// Reached by a focused event from the light, and none itself: merges may end here.
     pub merges: bool,
 }
 

@@ -396,7 +396,7 @@ fn connect<R: Record, O: Observe>(
         let light = Vertex::again(scene, y.surface, y.w_back, y.by_material);
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
-        // A merge at either end exists only where the other end is focused.
+        // The vertex on the light's side of a merge is focused; which of the two ends that is, is known here.
         let merged = |possible: bool, clear: bool| if possible { h.raise(cx.merge.at(clear)) } else { 0.0 };
         let clear = walk.clear && vertex.focused;
         let at_eye = merged(walk.length > 0 && !vertex.focused && light.focused, walk.clear);
@@ -462,7 +462,7 @@ fn meet<R: Record, O: Observe>(
     finish(cx, path, value, join, u32::from(y.length) + 1, tally);
 }
 
-/// Merges `vertex`, reached by a focused event, with the light vertices around it that were so as well.
+/// Merges `vertex` with the light vertices around it that focused events led to.
 fn merge<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,
