@@ -16,7 +16,7 @@ pub struct LightVertex {
     /// Unit direction to its predecessor (towards the light).
     pub w_back: Vec3,
     /// What only some materials need. Where all events are focused: what [`Self::partial`] is more by in `b` where
-    /// all is focused between it and the eye, see [`Sums::clear`](super::walk::Sums::clear). Elsewhere: the density with
+    /// all is focused between it and the eye, see [`Sums::merged`](super::walk::Sums::merged). Elsewhere: the density with
     /// which gathering would take `w_back` as a learned direction; negative where nothing was learned.
     pub by_material: f32,
     /// Flux arriving per light path, over its density.

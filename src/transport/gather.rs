@@ -67,7 +67,7 @@ pub fn follow<R: Record, O: Observe>(
         delta: false,
         focused: false,
         clear: true,
-        merge: [0.0; 2],
+        merge: 0.0,
         from: start.lens,
         cos_from: 1.0,
         parallel: scene.sensor.is_orthographic(),
@@ -401,10 +401,7 @@ fn connect<R: Record, O: Observe>(
         let clear = walk.clear && vertex.focused;
         let at_eye = merged(walk.length > 0 && !vertex.focused && light.focused, walk.clear);
         let at_light = merged(y.merges, clear);
-        let mut behind = y.partial;
-        if light.focused && clear {
-            behind.b += y.by_material;
-        }
+        let behind = if light.focused && clear { y.partial.and(y.by_material) } else { y.partial };
         let weight = mis::connect(
             h,
             plan.c,

@@ -124,11 +124,10 @@ impl<R: Real> Partial<R> {
         self.a + self.b * h.raise(p_rev)
     }
 
-    /// The same where a merge adds `sum` to the sum of the vertex before (its raised count, if it is there); `p` and `j` as
-    /// in [`Self::arrive`].
+    /// With so much more in `b`.
     #[inline(always)]
-    pub fn and_merge(self, h: Heuristic, sum: R, p: R, j: R) -> Self {
-        Self { a: self.a, b: self.b + sum * h.raise(j) / h.raise(p) }
+    pub fn and(self, b: R) -> Self {
+        Self { a: self.a, b: self.b + b }
     }
 
     /// The sum after a Dirac event: no join can end there, and the reverse density is the
@@ -137,6 +136,13 @@ impl<R: Real> Partial<R> {
     pub fn at_delta(self, h: Heuristic, prob_rev: R, dirac_ratio: R) -> R {
         self.b * h.raise(prob_rev * dirac_ratio)
     }
+}
+
+/// What [`Partial::b`] is more by where a merge adds `sum` to the sum of the vertex before (its raised count, if it is
+/// there); `p` and `j` as in [`Partial::arrive`].
+#[inline(always)]
+pub fn merge_before<R: Real>(h: Heuristic, sum: R, p: R, j: R) -> R {
+    sum * h.raise(j) / h.raise(p)
 }
 
 #[inline(always)]

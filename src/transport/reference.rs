@@ -219,7 +219,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) 
         };
         *arrived = mis::Partial::arrive(h, count, d.g[i], 1.0, sum);
         if i > 2 {
-            *arrived = arrived.and_merge(h, h.raise(merged_at(d, i - 1, merge)), d.g[i], 1.0);
+            *arrived = arrived.and(mis::merge_before(h, h.raise(merged_at(d, i - 1, merge)), d.g[i], 1.0));
         }
         sum = resolve(*arrived, i, if i > 1 { d.s[i - 1] } else { 0.0 });
     }
@@ -235,7 +235,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) 
         };
         shoot[i] = mis::Partial::arrive(h, count, d.s[i], 1.0, sum);
         if i + 2 < k {
-            shoot[i] = shoot[i].and_merge(h, h.raise(merged_at(d, i + 1, merge)), d.s[i], 1.0);
+            shoot[i] = shoot[i].and(mis::merge_before(h, h.raise(merged_at(d, i + 1, merge)), d.s[i], 1.0));
         }
         sum = resolve(shoot[i], i, d.g[i + 1]);
     }

@@ -66,7 +66,7 @@ pub fn emit<R: Record, O: Observe>(
         delta: false,
         focused: false,
         clear: true,
-        merge: [0.0; 2],
+        merge: 0.0,
         from: start.point.y,
         cos_from,
         parallel: start.infinite,
@@ -99,13 +99,11 @@ pub fn emit<R: Record, O: Observe>(
             plan.c
         };
         let sums = walk.partial(cx, arrival, count);
-        let partial = sums.at(vertex.focused);
         let merges = walk.focused && !vertex.focused;
         if !vertex.closure.is_delta() {
             if plan.settings.techniques.splat && (length > 1 || plan.splat_direct) {
-                // From here to the eye there is nothing.
-                let partial = Partial { b: partial.b + if vertex.focused { sums.clear } else { 0.0 }, ..partial };
-                splat(cx, &walk, &vertex, partial, start, random, tally);
+                // From here to the eye there is no other event.
+                splat(cx, &walk, &vertex, sums.at(vertex.focused), start, random, tally);
             }
             if let Some(cache) = cache.as_mut()
                 && length + 2 <= plan.settings.max_length
@@ -114,9 +112,9 @@ pub fn emit<R: Record, O: Observe>(
                 cache.push(LightVertex {
                     surface,
                     w_back: vertex.w_back,
-                    by_material: if vertex.focused { sums.clear } else { vertex.learned_back() },
+                    by_material: if vertex.focused { sums.merged } else { vertex.learned_back() },
                     throughput: walk.throughput,
-                    partial,
+                    partial: sums.partial,
                     length: length as u16,
                     class: walk.class,
                     first_delta: walk.first_delta,

@@ -6,7 +6,7 @@
 
 use super::cache::LightVertex;
 use super::class::{PathFilter, Positions, Symbol};
-use super::mis::{MergeCount, Partial};
+use super::mis::{self, MergeCount, Partial};
 use super::mutant::{Mutant, planted};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
@@ -71,9 +71,9 @@ pub struct Walk {
     pub focused: bool,
     /// All events so far were focused, if there were any.
     pub clear: bool,
-    /// What a merge behind adds to the MIS sum of the vertex that was left if the next event is focused (already raised): of the
-    /// gathering walker; and of the shooting walker, where in addition from there to the eye all is focused.
-    pub merge: [f32; 2],
+    /// What a merge behind adds to the MIS sum of the vertex that was left (already raised): of the gathering walker, if the next
+    /// event is focused; of the shooting walker, if all events from there to the eye are.
+    pub merge: f32,
     /// Position of the vertex that was left.
     pub from: Vec3,
     /// Its geometric cosine towards the direction taken; 1 for a light at infinity.
@@ -115,19 +115,18 @@ pub struct Arrival {
 /// MIS sums on arrival at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Sums {
-    /// Where the event at the vertex is not focused.
+    /// In any case.
     pub partial: Partial<f32>,
-    /// Where it is, merges behind it included.
-    pub focused: Partial<f32>,
-    /// What `b` is more by where in addition all is focused between it and the eye; 0 for the walker that comes from there.
-    pub clear: f32,
+    /// What `b` is more by where the event at the vertex is focused; of the shooting walker, where all events from here to the
+    /// eye are.
+    pub merged: f32,
 }
 
 impl Sums {
-    /// For joins at a vertex of a material that is `focused` or not.
+    /// Where that is so, or not.
     #[inline]
     pub fn at(&self, focused: bool) -> Partial<f32> {
-        if focused { self.focused } else { self.partial }
+        if focused { self.partial.and(self.merged) } else { self.partial }
     }
 }
 
@@ -150,12 +149,8 @@ impl Walk {
         let h = cx.plan.settings.heuristic;
         let j = self.cos_from * arrival.inv_d2;
         let partial = Partial::arrive(h, count, arrival.p_a, j, self.k);
-        if self.merge == [0.0; 2] || planted(Mutant::MergeWeight) {
-            return Sums { partial, focused: partial, clear: 0.0 };
-        }
-        let [any, clear] = self.merge;
-        let merged = |partial: Partial<f32>, sum| partial.and_merge(h, sum, arrival.p_a, j);
-        Sums { partial, focused: merged(partial, any), clear: merged(Partial { a: 0.0, b: 0.0 }, clear).b }
+        let merge = if planted(Mutant::MergeWeight) { 0.0 } else { self.merge };
+        Sums { partial, merged: mis::merge_before(h, merge, arrival.p_a, j) }
     }
 
     /// Leaves a vertex along a sampled direction, `sums` those of [`Self::partial`] there.
@@ -166,18 +161,19 @@ impl Walk {
         self.guided *= s.guided;
         let resolved =
             |partial: Partial<f32>| if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
-        self.k = resolved(if s.focused { sums.focused } else { sums.partial });
+        self.k = resolved(if equation == Equation::Rendering { sums.at(s.focused) } else { sums.partial });
         self.merge = match equation {
-            _ if s.focused => [0.0, resolved(Partial { a: 0.0, b: sums.clear })],
-            // From the eye, there is a merge here if the next event is focused.
-            Equation::Rendering if self.length > 0 => [h.raise(cx.merge.at(self.clear)), 0.0],
-            // From the light, if that was so before, and it counts for more if all that comes is.
+            // There is a merge here if the next event is focused.
+            Equation::Rendering if self.length > 0 && !s.focused => h.raise(cx.merge.at(self.clear)),
+            Equation::Rendering => 0.0,
+            Equation::Potential if s.focused => resolved(Partial { a: 0.0, b: sums.merged }),
+            // There is one if the event before was, and it counts for more if all that comes is.
             Equation::Potential if self.focused && !planted(Mutant::MergeWeight) => {
                 let by_chance = h.raise(cx.merge.by_chance);
                 self.k += by_chance;
-                [0.0, h.raise(cx.merge.clear) - by_chance]
+                h.raise(cx.merge.clear) - by_chance
             }
-            _ => [0.0; 2],
+            Equation::Potential => 0.0,
         };
         self.clear &= s.focused;
         self.focused = s.focused;
