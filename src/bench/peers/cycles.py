@@ -1,16 +1,8 @@
-"""Renders a scene by Blender's Cycles, as a child of `nephroid bench`; `translate.py` goes before it.
-
-The job is one line of JSON on standard input, then one line per run. Every answer is one line of JSON.
-Images are written as raw 32 bit floats, three per pixel, to the file that the run names.
-"""
-import json, re, resource, sys, tempfile, time
+"""Renders a scene by Blender's Cycles; `common.py` and `translate.py` go before it."""
+import re, tempfile
 
 # Stands for no limit of path length.
 DEEPEST = 1024
-
-
-def answer(**what):
-    print(json.dumps(what), file=channel, flush=True)
 
 
 class Translation:
@@ -342,42 +334,12 @@ def render_piece(bpy, file, spp, offset, seed):
     return pixels.reshape(size)[..., :3], seconds
 
 
-def run(job, bpy, pixels):
-    """To every mark, in pieces that end there; their mean is weighted by samples."""
-    total, samples, seconds, told = None, 0, 0.0, 0
-    rate = job.get("rate") or 1.0
-    most = max(1, 16_000_000 // pixels)
-    for mark in job["marks"]:
-        while True:
-            left = mark["samples"] - samples if "samples" in mark else (mark["seconds"] - seconds) * rate
-            if left <= 0 or ("seconds" in mark and samples and left < 0.5):
-                break
-            # Not all at once, since the rate may change.
-            spp = max(1, min(round(left if left < 8 or "samples" in mark else 0.7 * left), most))
-            image, took = render_piece(bpy, job["file"] + ".exr", spp, samples, job["seed"] % 2**31)
-            # Of the digits after the point it has two.
-            seconds += took + 0.005
-            total = image.astype("float64") * spp if total is None else total + image.astype("float64") * spp
-            samples += spp
-            rate = samples / seconds
-        # Where a render takes longer than the time between two marks, the image is that of the mark before.
-        if samples > told:
-            told = samples
-            # Blender's first row is the lowest.
-            (total / samples)[::-1].astype("float32").tofile(job["file"])
-            answer(seconds=seconds, samples=samples)
-            # The file is read before the next one is written.
-            sys.stdin.readline()
-    answer(done=True, rate=rate, memory=1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-
-
 def main():
     setup = json.loads(sys.stdin.readline())
     try:
         import bpy
     except ImportError as error:
-        return answer(error=f"this Python has no package `bpy` ({error}); `pip install bpy` gets it, and the environment "
-                            "variable NEPHROID_PYTHON names another Python")
+        return without("bpy", error)
     if setup["hide_emitters"]:
         return answer(error="`hide_emitters` is not known to this peer")
     scene = read_scene(setup["scene"], setup["define"])
@@ -385,6 +347,8 @@ def main():
     configure(bpy.context.scene, setup)
     translation = Translation(bpy, setup["integrator"] == "mnee")
     translation.camera(scene["camera"])
+    if scene["camera"]["filter"] != "box":
+        translation.close_to(f"the filter `{scene['camera']['filter']}` as a box")
     for mesh in scene["meshes"]:
         translation.mesh(mesh)
     for light in scene["lights"]:
@@ -394,15 +358,16 @@ def main():
         render_piece(bpy, os.path.join(folder, "image.exr"), 1, 0, 0)
     answer(ready=True, version=bpy.app.version_string, approximations=translation.similar)
     for line in iter(sys.stdin.readline, ""):
-        run(json.loads(line), bpy, setup["size"][0] * setup["size"][1])
+        job = json.loads(line)
+
+        def piece(spp, samples):
+            image, took = render_piece(bpy, job["file"] + ".exr", spp, samples, job["seed"] % 2**31)
+            # Blender's first row is the lowest, and its seconds have two digits after the point.
+            return image[::-1], took + 0.005
+
+        run_pieces(job, piece, max(1, 16_000_000 // (setup["size"][0] * setup["size"][1])), cautious=True)
 
 
 # Blender looks for modules by names as common as `cycles`, which must not be found in the working directory.
 sys.path = [path for path in sys.path if path]
-# Whatever libraries print must not get between the answers.
-channel = os.fdopen(os.dup(1), "w")
-os.dup2(2, 1)
-try:
-    main()
-except Exception as error:
-    answer(error=str(error).strip() or type(error).__name__)
+serve(main)

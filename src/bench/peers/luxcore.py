@@ -1,16 +1,7 @@
-"""Renders a scene by LuxCore, as a child of `nephroid bench`; `translate.py` goes before it.
-
-The job is one line of JSON on standard input, then one line per run. Every answer is one line of JSON.
-Images are written as raw 32 bit floats, three per pixel, to the file that the run names.
-"""
-import json, resource, sys, time
+"""Renders a scene by LuxCore; `common.py` and `translate.py` go before it."""
 
 # Stands for no limit: without roulette every vertex of one walk is joined with every one of the other.
 DEEPEST = {"BIDIRCPU": 24, "PATHCPU": 100}
-
-
-def answer(**what):
-    print(json.dumps(what), file=channel, flush=True)
 
 
 class Translation:
@@ -250,12 +241,9 @@ def run(job, lux, setup, scene):
         session.GetFilm().GetOutputFloat(lux.FilmOutputType.RGB_IMAGEPIPELINE, image, 0)
         seconds = time.perf_counter() - start
         # LuxCore's first row is the lowest.
-        image[::-1].tofile(job["file"])
-        answer(seconds=seconds, samples=round(done))
-        # The file is read before the next one is written.
-        sys.stdin.readline()
+        tell_image(job, image[::-1], seconds=seconds, samples=round(done))
     session.Stop()
-    answer(done=True, memory=1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    tell_end()
 
 
 def main():
@@ -263,14 +251,15 @@ def main():
     try:
         import pyluxcore as lux
     except ImportError as error:
-        return answer(error=f"this Python has no package `pyluxcore` ({error}); `pip install pyluxcore` gets it, and the "
-                            "environment variable NEPHROID_PYTHON names another Python")
+        return without("pyluxcore", error)
     lux.Init(lambda message: None)
     if setup["hide_emitters"]:
         return answer(error="`hide_emitters` is not known to this peer")
     scene = read_scene(setup["scene"], setup["define"])
     translation, materials = Translation(lux), {}
     translation.camera(scene["camera"], setup["size"])
+    if scene["camera"]["filter"] != "box":
+        translation.close_to(f"the filter `{scene['camera']['filter']}` as a box")
     for mesh in scene["meshes"]:
         translation.mesh(mesh, materials)
     for light in scene["lights"]:
@@ -285,12 +274,6 @@ def main():
         run(json.loads(line), lux, setup, translation.scene)
 
 
-# Whatever libraries print must not get between the answers.
-channel = os.fdopen(os.dup(1), "w")
-os.dup2(2, 1)
-try:
-    main()
-except Exception as error:
-    answer(error=str(error).strip() or type(error).__name__)
+serve(main)
 # Its own clearing up ends in a crash.
 os._exit(0)

@@ -2,7 +2,8 @@
 //!
 //! A peer is a program that speaks lines of JSON ([`process`]): it is told a scene once and a run at a time,
 //! and answers with an image at every mark. A new one is a script, a file like [`mitsuba`] that starts it, and
-//! a line in `PEERS`. Peers that do not read Mitsuba's scenes get theirs from `translate.py`, which refuses what it does not know.
+//! a line in `PEERS`. All scripts begin with `common.py`; those that do not read Mitsuba's scenes get theirs from
+//! `translate.py`, which refuses what it does not know.
 
 pub mod cycles;
 pub mod luxcore;
@@ -13,6 +14,9 @@ use super::{Subject, size};
 use process::Process;
 use serde_json::json;
 use std::process::Command;
+
+/// What all scripts begin with.
+const COMMON: &str = include_str!("common.py");
 
 /// Names the Python that has the peers' packages, where `python3` has not.
 const PYTHON: &str = "NEPHROID_PYTHON";
@@ -73,7 +77,7 @@ impl Job<'_, '_> {
             setup[*key] = json!(value);
         }
         let mut command = Command::new(std::env::var_os(PYTHON).unwrap_or_else(|| "python3".into()));
-        command.arg("-c").arg(script.join("\n"));
+        command.arg("-c").arg([&[COMMON], script].concat().join("\n"));
         let mut process = Process::start(&mut command, name, size(scene), &setup)?;
         let version = process.ready["version"].as_str().unwrap_or("of unknown version");
         let nearly = process.ready["approximations"].as_array().into_iter().flatten().filter_map(|a| a.as_str());

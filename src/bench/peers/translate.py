@@ -20,7 +20,7 @@ METALS = {"Ag": ((0.155276, 0.116728, 0.138388), (4.82835, 3.12222, 2.1469)),
           "Cr": ((4.36967, 2.91651, 1.6549), (5.20655, 4.23131, 3.7547)),
           "Cu": ((0.201005, 0.92375, 1.10222), (3.91326, 2.45305, 2.14209))}
 # What changes nothing in the expected image, or is told to the peer by the setup.
-WITHOUT_EFFECT = {"sampler", "rfilter", "integrator", "sampling_weight", "silhouette_sampling_weight", "sample_visible",
+WITHOUT_EFFECT = {"sampler", "integrator", "sampling_weight", "silhouette_sampling_weight", "sample_visible",
                   "shutter_open", "shutter_close", "file_format", "pixel_format", "component_format", "banner", "accel",
                   "format", "mis_compensation"}
 
@@ -507,6 +507,7 @@ def camera_of(thing):
     films = thing.take("film")
     film = films[0] if films else None
     w, h = (film.get("width", 768.0), film.get("height", 576.0)) if film else (768.0, 576.0)
+    filters = film.take("rfilter") if film else []
     if film:
         film.done()
     m = thing.get("to_world", np.eye(4))
@@ -520,7 +521,8 @@ def camera_of(thing):
     side = {"x": w, "y": h, "diagonal": math.hypot(w, h)}[axis]
     made = {"origin": m[:3, 3], "ahead": axes[:, 2], "up": axes[:, 1], "aspect": w / h,
             "fov_x": 2 * math.atan(math.tan(math.radians(fov) / 2) * w / side), "near": thing.get("near_clip", 0.01),
-            "far": thing.get("far_clip", 1e4), "radius": 0.0, "focus": 1.0}
+            "far": thing.get("far_clip", 1e4), "radius": 0.0, "focus": 1.0,
+            "filter": filters[0].type if filters else "gaussian"}
     if thing.type == "thinlens":
         made.update(radius=thing.get("aperture_radius"), focus=thing.get("focus_distance", made["far"]))
     thing.done()
