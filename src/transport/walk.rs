@@ -149,8 +149,9 @@ impl Walk {
         let h = cx.plan.settings.heuristic;
         let j = self.cos_from * arrival.inv_d2;
         let partial = Partial::arrive(h, count, arrival.p_a, j, self.k);
-        let merge = if planted(Mutant::MergeWeight) { 0.0 } else { self.merge };
-        Sums { partial, merged: mis::merge_before(h, merge, arrival.p_a, j) }
+        // Most walks have none, and where the density underflows 0 / 0 must not enter.
+        let merges = self.merge > 0.0 && !planted(Mutant::MergeWeight);
+        Sums { partial, merged: if merges { mis::merge_before(h, self.merge, arrival.p_a, j) } else { 0.0 } }
     }
 
     /// Leaves a vertex along a sampled direction, `sums` those of [`Self::partial`] there.
