@@ -31,9 +31,6 @@ struct Axes {
     four: [f32; 4],
 }
 
-/// Points of a sequence that are used together: more come from another sequence.
-const SEQUENCE: u64 = 1 << 16;
-
 /// Which family of samples a stream belongs to; families never share numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -75,9 +72,10 @@ impl Random {
     /// that belongs to `index` of `family`.
     #[inline]
     pub fn with_point(mut self, family: Family, index: u64, point: u64, seed: u64, axes: u32) -> Self {
-        let sequence = index ^ (point / SEQUENCE).rotate_right(16);
+        // A sequence has 2³² points; more come from another one.
+        let sequence = index ^ (point >> 32).rotate_right(16);
         let seed = mix(seed ^ mix(!((family as u64) << 56) ^ sequence.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
-        let of = Point::new((point % SEQUENCE) as u32, seed as u32);
+        let of = Point::new(point as u32, seed as u32);
         self.point = Axes { of, next: 0, end: axes.min(4 * FOURS), four: [0.0; 4] };
         self
     }

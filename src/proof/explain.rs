@@ -286,9 +286,8 @@ fn class(t: &Testimony) -> String {
 }
 
 fn strong(cx: Context<'_>, value: Spectrum, t: &Testimony, per: impl Fn(f64) -> f64) -> Strong {
-    let densities = t.path.densities(cx.scene, cx.plan);
-    let merge = cx.merge.into();
-    let joins = products(&densities, cx.plan, merge).into_iter().zip(weights(&densities, cx.plan, merge));
+    let (densities, eta) = (t.path.densities(cx), cx.eta.into());
+    let joins = products(&densities, cx.plan, eta).into_iter().zip(weights(&densities, cx.plan, eta));
     let possible = |((key, density), (_, weight)): ((JoinKey, f64), (JoinKey, f64))| Possible {
         by: Name::new(key.0, key.1),
         density,

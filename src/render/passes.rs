@@ -21,7 +21,7 @@ use std::time::Instant;
 
 /// Light paths of one job.
 pub const SHOOT_JOB: u32 = 4096;
-/// Emission and the first scattering of a light path; all light paths of a pass share a sequence.
+/// Emission and the first scattering of a light path; all light paths of all passes share a sequence.
 const SHOOT_AXES: u32 = 8;
 /// The film, where pixels share walks; all passes share a sequence.
 const FILM_AXES: u32 = 4;
@@ -104,7 +104,8 @@ fn run_into<S: Sink>(render: &mut Render<'_>, range: Range<u64>) {
 pub(crate) fn light_path_random(plan: &Plan, index: u32, pass: u64) -> Random {
     let (index, seed) = (u64::from(index), plan.settings.seed);
     let random = Random::new(Family::Shoot, index, pass, seed);
-    if plan.settings.stratified { random.with_point(Family::Shoot, pass, index, seed, SHOOT_AXES) } else { random }
+    let point = pass.wrapping_mul(u64::from(plan.light_paths)).wrapping_add(index);
+    if plan.settings.stratified { random.with_point(Family::Shoot, 0, point, seed, SHOOT_AXES) } else { random }
 }
 
 /// The random numbers of the pixel with number `id` in the whole film.

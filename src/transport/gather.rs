@@ -67,6 +67,7 @@ pub fn follow<R: Record, O: Observe>(
         delta: false,
         focused: false,
         clear: true,
+        merges: None,
         merge: 0.0,
         from: start.lens,
         cos_from: 1.0,
@@ -121,7 +122,7 @@ fn go_on<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let sums = walk.partial(cx, arrival, count);
+        let sums = walk.partial(cx, arrival, count, vertex.focused);
         if !vertex.closure.is_delta() {
             let partial = sums.at(vertex.focused);
             if plan.settings.techniques.next_event {
@@ -397,10 +398,10 @@ fn connect<R: Record, O: Observe>(
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
         // The vertex on the light's side of a merge is focused; which of the two ends that is, is known here.
-        let merged = |possible: bool, clear: bool| if possible { h.raise(cx.merge.at(clear)) } else { 0.0 };
+        let merged = |possible: bool, p, clear| if possible && cx.eta > 0.0 { h.raise(cx.merge_count(p, clear)) } else { 0.0 };
         let clear = walk.clear && vertex.focused;
-        let at_eye = merged(walk.length > 0 && !vertex.focused && light.focused, walk.clear);
-        let at_light = merged(y.merges, clear);
+        let at_eye = merged(walk.length > 0 && !vertex.focused && light.focused, vertex.surface.p, walk.clear);
+        let at_light = merged(y.merges, y.surface.p, clear);
         let behind = if light.focused && clear { y.partial.and(y.by_material) } else { y.partial };
         let weight = mis::connect(
             h,
@@ -472,13 +473,15 @@ fn merge<R: Record, O: Observe>(
     let h = plan.settings.heuristic;
     // Of η, the area of the disk and the number of light paths.
     let factor = plan.light_paths as f32 * plan.inv_light_paths / cx.eta;
+    let mut count = None;
     lights.around(vertex.surface.p, cx.merge_radius2, |index, y| {
         let length = walk.length + 1 + u32::from(y.length);
         if !plan.wants_length(length) || y.surface.n_g.dot(vertex.surface.n_g).abs() < SAME_SURFACE {
             return;
         }
         let Some(k) = vertex.kernel(EQUATION, y.w_back) else { return };
-        let weight = mis::merge(h, cx.merge.at(walk.clear), partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
+        let count = *count.get_or_insert_with(|| cx.merge_count(vertex.surface.p, walk.clear));
+        let weight = mis::merge(h, count, partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
         // Flux per area is irradiance: the kernel's cosine is already in it.
         let cos_g = if planted(Mutant::MergeCosine) { 1.0 } else { k.cos_g };
         let value = walk.throughput * y.throughput * k.value * (factor * weight / cos_g);

@@ -27,8 +27,8 @@
 //! Two vertices in a corner that light reaches by way of a caustic are badly joined by a connection, whose 1/d² nothing bounds;
 //! a merge at the second is not. But a gathering walk that comes upon a caustic by chance merges all of it at once. By its density a merge would seem
 //! the best of all joins there, though all that is merged shares the one chance [Grittmann 2021]: so it counts
-//! for less where not all events between it and the eye are focused ([`MergeCount`]). The shooting walker does not know that before
-//! the eye is reached, and carries the difference apart.
+//! for less where not all events between it and the eye are focused ([`count_by_chance`]), the more so the more crowded the place
+//! is ([`super::crowd`]). The shooting walker does not know that before the eye is reached, and carries the difference apart.
 //!
 //! The power heuristic (exponent 2) is the same recursion with every density and count squared.
 
@@ -71,33 +71,11 @@ impl Heuristic {
     }
 }
 
-/// What a merge counts for in the weights: η, or less.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MergeCount<R> {
-    /// Where all is focused between the eye and the merge: η.
-    pub clear: R,
-    /// Where a gathering walk came there by chance: η over how many light vertices it merges at once.
-    pub by_chance: R,
-}
-
-impl<R: Real> MergeCount<R> {
-    /// Of η and the number of light vertices that are merged at once.
-    #[inline(always)]
-    pub fn new(eta: R, crowd: R) -> Self {
-        Self { clear: eta, by_chance: if crowd > R::ONE { eta / crowd } else { eta } }
-    }
-
-    /// The one that applies.
-    #[inline(always)]
-    pub fn at(self, clear: bool) -> R {
-        if clear { self.clear } else { self.by_chance }
-    }
-}
-
-impl From<MergeCount<f32>> for MergeCount<f64> {
-    fn from(m: MergeCount<f32>) -> Self {
-        Self { clear: m.clear.into(), by_chance: m.by_chance.into() }
-    }
+/// What a merge counts for in the weights where a gathering walk came by chance: with `crowd` = M light vertices there on
+/// average, which are merged at once or not at all, the second moment is that of η/(1 + M) independent finds.
+#[inline(always)]
+pub fn count_by_chance<R: Real>(eta: R, crowd: R) -> R {
+    eta / (R::ONE + crowd)
 }
 
 /// Partial sum of a subpath on arrival at a vertex: `a + b·raise(p_rev)`.

@@ -26,6 +26,7 @@ pub mod branch;
 pub mod cache;
 pub mod chain;
 pub mod class;
+pub mod crowd;
 pub mod gather;
 pub mod incident;
 mod lamp;

@@ -8,7 +8,7 @@
 //! with `G_i = g_1 … g_i` and `S_i = s_i … s_k`. In f64 and quadratic in the length: the recursion of
 //! [`super::mis`] is tested against it. A [`Witness`] watches walks and rebuilds their paths.
 
-use super::mis::{self, MergeCount};
+use super::mis;
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
 use super::walk::{Context, Join, Observe};
@@ -65,6 +65,8 @@ pub struct Densities {
     pub delta: Vec<bool>,
     /// Which are that or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
     pub focused: Vec<bool>,
+    /// Light vertices that a merge at each finds at once.
+    pub crowd: Vec<f64>,
 }
 
 /// A join and the number of vertices that shooting made.
@@ -80,11 +82,13 @@ impl Path {
     }
 
     /// All densities, from the positions alone.
-    pub fn densities(&self, scene: &Scene, plan: &Plan) -> Densities {
+    pub fn densities(&self, cx: Context<'_>) -> Densities {
+        let (scene, plan) = (cx.scene, cx.plan);
         let k = self.edges();
         let m = self.vertices.len();
         let no = vec![false; k + 1];
-        let mut d = Densities { g: vec![0.0; k + 1], s: vec![0.0; k + 1], nu: 0.0, delta: no.clone(), focused: no };
+        let none = vec![0.0; k + 1];
+        let mut d = Densities { g: none.clone(), s: none.clone(), nu: 0.0, delta: no.clone(), focused: no, crowd: none };
         let to_light = self.direction_to_light(scene, self.vertices[m - 1].surface.p);
         let first = self.vertices[0].surface;
         let w = (first.p - self.lens).normalize();
@@ -104,6 +108,7 @@ impl Path {
                 }
             };
             d.delta[i + 1] = v.dirac.is_some();
+            d.crowd[i + 1] = f64::from(cx.crowd(p));
             d.focused[i + 1] = v.dirac.is_some() || scene.materials.is_focused(v.surface.material);
             if i + 1 < m {
                 d.g[i + 2] = p_gather * jacobian(p, &self.vertices[i + 1].surface);
@@ -136,7 +141,7 @@ impl Path {
 
     /// Weight of every join that could have made this path (k ≥ 2).
     pub fn weights(&self, cx: Context<'_>) -> Vec<(JoinKey, f64)> {
-        weights(&self.densities(cx.scene, cx.plan), cx.plan, cx.merge.into())
+        weights(&self.densities(cx), cx.plan, cx.eta.into())
     }
 }
 
@@ -146,8 +151,8 @@ fn jacobian(from: Vec3, to: &Surface) -> f64 {
     f64::from((d.normalize()).dot(to.n_g).abs()) / f64::from(d.length_squared())
 }
 
-/// The density of every join: how many such paths it makes per sample and product of areas; `merge` as in [`Context`].
-pub fn products(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinKey, f64)> {
+/// The density of every join: how many such paths it makes per sample and product of areas; `eta` as in [`Context`].
+pub fn products(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let gathered = |i: usize| d.g[1..=i].iter().product::<f64>();
@@ -169,16 +174,16 @@ pub fn products(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(Join
     if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), f64::from(plan.n) * shot(1)));
     }
-    for (i, count) in (2..k - 1).map(|i| (i, merged_at(d, i, merge))).filter(|m| m.1 > 0.0) {
+    for (i, count) in (2..k - 1).map(|i| (i, merged_at(d, i, eta))).filter(|m| m.1 > 0.0) {
         joins.push(((Technique::Merge, k - i + 1), count * gathered(i) * shot(i)));
     }
     joins
 }
 
-/// Weights from the products of densities; `merge` as in [`Context`].
-pub fn weights(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinKey, f64)> {
+/// Weights from the products of densities; `eta` as in [`Context`].
+pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     let h = plan.settings.heuristic;
-    let mut joins = products(d, plan, merge);
+    let mut joins = products(d, plan, eta);
     let total: f64 = joins.iter().map(|j| h.raise(j.1)).sum();
     for j in &mut joins {
         j.1 = if total > 0.0 { h.raise(j.1) / total } else { 0.0 };
@@ -187,13 +192,24 @@ pub fn weights(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinK
 }
 
 /// What a merge at v_i counts for: 0 where there is none, since it is seen directly, is focused itself, or lit by what is not.
-fn merged_at(d: &Densities, i: usize, merge: MergeCount<f64>) -> f64 {
+fn merged_at(d: &Densities, i: usize, eta: f64) -> f64 {
     let possible = i > 1 && !d.focused[i] && d.focused[i + 1];
-    if possible { merge.at(d.focused[1..i].iter().all(|f| *f)) } else { 0.0 }
+    match possible {
+        true if d.is_clear(i) => eta,
+        true => mis::count_by_chance(eta, d.crowd[i]),
+        false => 0.0,
+    }
+}
+
+impl Densities {
+    /// All events between the eye and v_i are focused.
+    pub fn is_clear(&self, i: usize) -> bool {
+        self.focused[1..i].iter().all(|f| *f)
+    }
 }
 
 /// The same weights by the recursion of [`mis`], on numbers instead of walks.
-pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) -> Vec<(JoinKey, f64)> {
+pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let h = plan.settings.heuristic;
@@ -219,7 +235,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) 
         };
         *arrived = mis::Partial::arrive(h, count, d.g[i], 1.0, sum);
         if i > 2 {
-            *arrived = arrived.and(mis::merge_before(h, h.raise(merged_at(d, i - 1, merge)), d.g[i], 1.0));
+            *arrived = arrived.and(mis::merge_before(h, h.raise(merged_at(d, i - 1, eta)), d.g[i], 1.0));
         }
         sum = resolve(*arrived, i, if i > 1 { d.s[i - 1] } else { 0.0 });
     }
@@ -235,7 +251,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) 
         };
         shoot[i] = mis::Partial::arrive(h, count, d.s[i], 1.0, sum);
         if i + 2 < k {
-            shoot[i] = shoot[i].and(mis::merge_before(h, h.raise(merged_at(d, i + 1, merge)), d.s[i], 1.0));
+            shoot[i] = shoot[i].and(mis::merge_before(h, h.raise(merged_at(d, i + 1, eta)), d.s[i], 1.0));
         }
         sum = resolve(shoot[i], i, d.g[i + 1]);
     }
@@ -251,7 +267,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) 
     if plan.c > 0.0 {
         for i in 1..k.saturating_sub(1) {
             if !d.delta[i] && !d.delta[i + 1] {
-                let merged = |i: usize| h.raise(merged_at(d, i, merge));
+                let merged = |i: usize| h.raise(merged_at(d, i, eta));
                 let (k_i, h_next) = (k_at(i) + merged(i), h_at(i + 1) + merged(i + 1));
                 let w = mis::connect(h, c, d.s[i], k_i, d.g[i + 1], h_next);
                 joins.push(((Technique::Connect, k - i), w));
@@ -261,7 +277,7 @@ pub fn weights_by_recursion(d: &Densities, plan: &Plan, merge: MergeCount<f64>) 
     if plan.n > 0.0 && !d.delta[1] && (k > 2 || plan.splat_direct) {
         joins.push(((Technique::Splat, k), mis::splat(h, n, d.g[1], h_at(1))));
     }
-    for (i, count) in (2..k - 1).map(|i| (i, merged_at(d, i, merge))).filter(|m| m.1 > 0.0) {
+    for (i, count) in (2..k - 1).map(|i| (i, merged_at(d, i, eta))).filter(|m| m.1 > 0.0) {
         joins.push(((Technique::Merge, k - i + 1), mis::merge(h, count, k_at(i), h_at(i))));
     }
     joins

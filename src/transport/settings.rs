@@ -2,6 +2,7 @@
 
 use super::Technique;
 use super::class::PathFilter;
+use super::crowd::Crowds;
 use super::incident::Incident;
 use super::mis::Heuristic;
 use super::mutant::{Mutant, planted};
@@ -210,8 +211,8 @@ pub struct Plan {
     pub c: f32,
     /// Radius of merges in the first pass; 0 where nothing is merged.
     pub merge_radius: f32,
-    /// Mean number of light vertices that are merged at once in the first pass.
-    pub crowd: f32,
+    /// Where many light vertices are merged at once.
+    pub crowds: Arc<Crowds>,
     /// Reverse densities matter: both walkers take part in the weights.
     pub two_sided: bool,
     /// Hits and splats both make paths of length 1, each where it makes more of them.
@@ -251,7 +252,7 @@ impl Plan {
             n,
             c,
             merge_radius: if t.merge { settings.merge_radius.unwrap_or(0.0) } else { 0.0 },
-            crowd: 1.0,
+            crowds: Arc::default(),
             two_sided: light_paths > 0 && t.gathers(),
             shares_lamps: t.splat && t.hit,
             splat_direct: t.splat && !t.next_event,

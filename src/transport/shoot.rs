@@ -66,6 +66,7 @@ pub fn emit<R: Record, O: Observe>(
         delta: false,
         focused: false,
         clear: true,
+        merges: None,
         merge: 0.0,
         from: start.point.y,
         cos_from,
@@ -98,7 +99,7 @@ pub fn emit<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let sums = walk.partial(cx, arrival, count);
+        let sums = walk.partial(cx, arrival, count, vertex.focused);
         let merges = walk.focused && !vertex.focused;
         if !vertex.closure.is_delta() {
             if plan.settings.techniques.splat && (length > 1 || plan.splat_direct) {

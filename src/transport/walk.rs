@@ -6,7 +6,7 @@
 
 use super::cache::LightVertex;
 use super::class::{PathFilter, Positions, Symbol};
-use super::mis::{self, MergeCount, Partial};
+use super::mis::{self, Partial};
 use super::mutant::{Mutant, planted};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
@@ -30,8 +30,8 @@ pub struct Context<'a> {
     pub merge_radius2: f32,
     /// η of this pass: light paths times the area in which their vertices are merged.
     pub eta: f32,
-    /// What a merge counts for in the weights.
-    pub merge: MergeCount<f32>,
+    /// Light vertices in the radius of this pass, for one in that of the first.
+    pub crowded: f32,
     /// Part of what comes along chains of Dirac events (E S* L) that a sample counts: where several samples of chains
     /// belong to one gathering walk ([`super::chain::sample`]), one by their number.
     pub chain_part: f32,
@@ -42,9 +42,20 @@ impl<'a> Context<'a> {
     pub fn new(scene: &'a Scene, plan: &'a Plan, pass: u64) -> Self {
         let merge_radius2 = plan.merge_radius(pass).powi(2);
         let eta = plan.light_paths as f32 * std::f32::consts::PI * merge_radius2;
-        // Of as many as are merged at once in the first pass, those in the area of this one.
-        let crowd = plan.crowd * merge_radius2 / plan.merge_radius(0).powi(2).max(f32::MIN_POSITIVE);
-        Self { scene, plan, merge_radius2, eta, merge: MergeCount::new(eta, crowd), chain_part: 1.0 }
+        let crowded = merge_radius2 / plan.merge_radius(0).powi(2).max(f32::MIN_POSITIVE);
+        Self { scene, plan, merge_radius2, eta, crowded, chain_part: 1.0 }
+    }
+
+    /// Light vertices that a merge at `p` finds at once, on average.
+    #[inline]
+    pub fn crowd(&self, p: Vec3) -> f32 {
+        self.plan.crowds.at(p) * self.crowded
+    }
+
+    /// What a merge at `p` counts for in the weights, where all events between it and the eye are focused (`clear`) or not.
+    #[inline]
+    pub fn merge_count(&self, p: Vec3, clear: bool) -> f32 {
+        if clear { self.eta } else { mis::count_by_chance(self.eta, self.crowd(p)) }
     }
 
     /// The same where a pixel has so many samples of chains.
@@ -71,8 +82,11 @@ pub struct Walk {
     pub focused: bool,
     /// All events so far were focused, if there were any.
     pub clear: bool,
-    /// What a merge behind adds to the MIS sum of the vertex that was left (already raised): of the gathering walker, if the next
-    /// event is focused; of the shooting walker, if all events from there to the eye are.
+    /// Of the gathering walker: there is a merge at the vertex that was left if the next event is focused, with all events before
+    /// focused (`true`) or not.
+    pub merges: Option<bool>,
+    /// Of the shooting walker: what merges behind add to the MIS sum of the vertex that was left (already raised) if all events
+    /// from there to the eye are focused.
     pub merge: f32,
     /// Position of the vertex that was left.
     pub from: Vec3,
@@ -143,15 +157,19 @@ impl Walk {
         Arrival { inv_d2, p_a }
     }
 
-    /// MIS sum of the vertex arrived at; `count` joins could have made the edge.
+    /// MIS sum of the vertex arrived at, where events are focused or not; `count` joins could have made the edge.
     #[inline]
-    pub fn partial(&self, cx: Context<'_>, arrival: Arrival, count: f32) -> Sums {
+    pub fn partial(&self, cx: Context<'_>, arrival: Arrival, count: f32, focused: bool) -> Sums {
         let h = cx.plan.settings.heuristic;
         let j = self.cos_from * arrival.inv_d2;
         let partial = Partial::arrive(h, count, arrival.p_a, j, self.k);
+        let merge = match self.merges {
+            Some(clear) if focused => h.raise(cx.merge_count(self.from, clear)),
+            _ => self.merge,
+        };
         // Most walks have none, and where the density underflows 0 / 0 must not enter.
-        let merges = self.merge > 0.0 && !planted(Mutant::MergeWeight);
-        Sums { partial, merged: if merges { mis::merge_before(h, self.merge, arrival.p_a, j) } else { 0.0 } }
+        let merges = merge > 0.0 && !planted(Mutant::MergeWeight);
+        Sums { partial, merged: if merges { mis::merge_before(h, merge, arrival.p_a, j) } else { 0.0 } }
     }
 
     /// Leaves a vertex along a sampled direction, `sums` those of [`Self::partial`] there.
@@ -163,16 +181,15 @@ impl Walk {
         let resolved =
             |partial: Partial<f32>| if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
         self.k = resolved(if equation == Equation::Rendering { sums.at(s.focused) } else { sums.partial });
+        self.merges = (equation == Equation::Rendering && self.length > 0 && !s.focused && cx.eta > 0.0).then_some(self.clear);
         self.merge = match equation {
-            // There is a merge here if the next event is focused.
-            Equation::Rendering if self.length > 0 && !s.focused => h.raise(cx.merge.at(self.clear)),
             Equation::Rendering => 0.0,
             Equation::Potential if s.focused => resolved(Partial { a: 0.0, b: sums.merged }),
             // There is one if the event before was, and it counts for more if all that comes is.
-            Equation::Potential if self.focused && !planted(Mutant::MergeWeight) => {
-                let by_chance = h.raise(cx.merge.by_chance);
+            Equation::Potential if self.focused && cx.eta > 0.0 && !planted(Mutant::MergeWeight) => {
+                let [clear, by_chance] = [true, false].map(|clear| h.raise(cx.merge_count(vertex.surface.p, clear)));
                 self.k += by_chance;
-                h.raise(cx.merge.clear) - by_chance
+                clear - by_chance
             }
             Equation::Potential => 0.0,
         };

@@ -6,13 +6,15 @@ use glam::{Vec2, Vec3};
 use nephroid::math::Random;
 use nephroid::math::random::Family;
 use nephroid::transport::cache::LightCache;
+use nephroid::transport::crowd::Crowds;
 use nephroid::transport::gather::gather;
-use nephroid::transport::mis::{Heuristic, MergeCount};
+use nephroid::transport::mis::Heuristic;
 use nephroid::transport::reference::{Densities, Testimony, Witness, weights, weights_by_recursion};
 use nephroid::transport::settings::{Plan, Settings, Techniques};
 use nephroid::transport::shoot::shoot;
 use nephroid::transport::walk::{Context, Tally};
 use nephroid::transport::{RayCounts, Technique};
+use std::sync::Arc;
 
 /// Random densities of a random path, as a brute-force oracle for the algebra.
 fn random_path(random: &mut Random) -> (Densities, Plan) {
@@ -23,6 +25,7 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
     let nu = density();
     let delta: Vec<bool> = (0..=k).map(|i| i > 0 && i < k && random.unit() < 0.35).collect();
     let focused = (0..=k).map(|i| delta[i] || (i > 0 && i < k && random.unit() < 0.3)).collect();
+    let crowd = (0..=k).map(|_| f64::from(random.unit() * 10.0 - 4.0).exp()).collect();
     if random.unit() < 0.3 {
         g[k] = 0.0;
     }
@@ -38,7 +41,7 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
     let merge_radius = Some((random.unit() * 4.0 - 4.0).exp());
     let settings = Settings { techniques, heuristic, connections, merge_radius, ..Settings::default() };
     let vertices = 0.5 + 3.0 * f64::from(random.unit());
-    (Densities { g, s, nu, delta, focused }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
+    (Densities { g, s, nu, delta, focused, crowd }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
 }
 
 #[test]
@@ -48,13 +51,12 @@ fn recursion_is_the_definition_for_100_000_random_paths() {
     while tested < 100_000 {
         let (d, plan) = random_path(&mut random);
         let eta = f64::from(plan.light_paths) * std::f64::consts::PI * f64::from(plan.merge_radius(0)).powi(2);
-        let merge = MergeCount::new(eta, f64::from(random.unit() * 5.0).exp());
-        let defined = weights(&d, &plan, merge);
+        let defined = weights(&d, &plan, eta);
         let total: f64 = defined.iter().map(|w| w.1).sum();
         if total == 0.0 {
             continue;
         }
-        let recursive = weights_by_recursion(&d, &plan, merge);
+        let recursive = weights_by_recursion(&d, &plan, eta);
         assert_eq!(defined.len(), recursive.len());
         for ((key, a), (other, b)) in defined.iter().zip(&recursive) {
             assert_eq!(key, other);
@@ -71,7 +73,14 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
     let world = scene(xml);
     let film = world.film.clone();
     let plan = with_lessons(&world, settings, Plan::new(settings, 64, film.width * film.height, 2.0));
-    let plan = Plan { crowd: 20.0, ..plan };
+    // Some places are crowded, as if a pilot had been there.
+    let mut shot = Vec::new();
+    for i in 0..256 {
+        let mut tally = Tally { record: &mut (), rays: &mut RayCounts::default(), observe: &mut () };
+        shoot(Context::new(&world, &plan, 0), Some(&mut shot), &mut Random::new(Family::Other, i, 0, seed()), &mut tally);
+    }
+    let points: Vec<Vec3> = shot.iter().map(|v| v.surface.p).collect();
+    let plan = Plan { crowds: Arc::new(Crowds::new(points.into_iter(), 0.1, 0.05)), ..plan };
     // One pass for all, so that one η belongs to all weights.
     let cx = Context::new(&world, &plan, 0);
     let (mut witness, mut rays) = (Witness::default(), RayCounts::default());

@@ -101,18 +101,23 @@ impl Candidate {
         Self { light_paths, next_event: t.next_event, connect: t.connect, merge: t.merge }
     }
 
-    fn noise(&self, evidence: &[Evidence]) -> f64 {
+    /// Of a pass, from what a mixture of all joins found that had `mixed` light paths per pixel.
+    fn noise(&self, evidence: &[Evidence], mixed: f64) -> f64 {
         let on = |b: bool| if b { 1.0 } else { 0.0 };
-        let n = self.light_paths;
-        let numbers = Technique::ALL.map(|technique| match technique {
-            Technique::Hit => 1.0,
-            Technique::NextEvent => on(self.next_event),
-            Technique::Connect => on(self.connect),
-            Technique::Splat => n,
-            Technique::Merge => n * on(self.merge),
-        });
+        let n = self.light_paths / mixed;
+        // Where merges find a crowd at once, more light paths make it larger, not more often found.
+        let merges = |crowd: f64| on(self.merge) * n * (1.0 + crowd) / (1.0 + n * crowd);
+        let numbers = |e: &Evidence| {
+            Technique::ALL.map(|technique| match technique {
+                Technique::Hit => 1.0,
+                Technique::NextEvent => on(self.next_event),
+                Technique::Connect => on(self.connect),
+                Technique::Splat => n,
+                Technique::Merge => merges(e.crowd),
+            })
+        };
         let one = |e: &Evidence| {
-            let rho: f64 = e.shares.iter().zip(numbers).map(|(r, n)| r * n).sum();
+            let rho: f64 = e.shares.iter().zip(numbers(e)).map(|(r, n)| r * n).sum();
             e.square / rho.max(LOST)
         };
         self.noisy(evidence).map(one).sum()
@@ -177,17 +182,18 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
     if pilot.settings.follows_chains() {
         plan.settings.faint = LEAST;
     }
-    let dark_squares = pilot.dark_squares();
+    let (light_paths, dark_squares) = (plan.light_paths, pilot.dark_squares());
     let chains = ChainNoise::measured(pilot, &plan, &dark_squares);
     let found = Findings::collected(pilot, plan, &dark_squares, paths);
     let branchings = found.branchings(pilot.settings.faint);
     let ways: Vec<_> = branchings.iter().flat_map(|b| SAMPLES.map(|samples| (b, samples))).collect();
     let pixels = pilot.pixels();
     let candidates = Candidate::all(pilot.settings, pixels);
+    let mixed = f64::from(light_paths) / f64::from(pixels);
     let judged = candidates.iter().flat_map(|c| {
         let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };
         let lacks = if c.next_event && c.connect { 1.0 } else { LESS_MUST_WIN };
-        let (noise, cost) = (c.noise(&found.evidence), c.cost(&found));
+        let (noise, cost) = (c.noise(&found.evidence, mixed), c.cost(&found));
         ways.iter().map(move |(b, samples)| {
             let noise = noise + chains.noise(b, *samples);
             let cost = cost + COSTS.branch * b.rays + chains.cost(*samples, COSTS.look, COSTS.branch);

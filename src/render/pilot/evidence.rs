@@ -39,6 +39,8 @@ pub(super) struct Evidence {
     pub(super) square: f64,
     /// r_τ by the number of the join.
     pub(super) shares: [f64; Technique::ALL.len()],
+    /// M: light vertices that its merges find at once and by chance, as a whole pass has them.
+    pub(super) crowd: f64,
     /// Without noise where next events are on: a delta light seen at the first vertex.
     pub(super) steady: bool,
     /// How much more rarely it would be found without guided gathering, where that is on: a factor on the density.
@@ -280,19 +282,33 @@ fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square:
     if !(value > 0.0 && value.is_finite() && square > 0.0) {
         return None;
     }
-    let mut shares = [0.0; Technique::ALL.len()];
-    let joins = |plan: &Plan| products(&t.path.densities(cx.scene, plan), plan, cx.merge.into());
+    let (mut shares, mut crowd) = ([0.0; Technique::ALL.len()], 0.0);
     let total = |joins: &[(JoinKey, f64)]| joins.iter().map(|j| j.1).sum::<f64>();
-    let found = joins(cx.plan);
+    let densities = t.path.densities(cx);
+    let found = products(&densities, cx.plan, cx.eta.into());
     let density = total(&found);
-    for ((technique, _), product) in &found {
-        shares[*technique as usize] += if density > 0.0 { product / density } else { 0.0 };
+    // Of a merge, by the number of vertices that shooting made.
+    let crowd_at = |s: usize| {
+        let i = t.path.vertices.len() + 2 - s;
+        if densities.is_clear(i) { 0.0 } else { densities.crowd[i] }
+    };
+    for ((technique, s), product) in &found {
+        let share = if density > 0.0 { product / density } else { 0.0 };
+        shares[*technique as usize] += share;
+        crowd += if *technique == Technique::Merge { share * crowd_at(*s) } else { 0.0 };
     }
-    let unguided = unguided.map_or(1.0, |plan| total(&joins(plan)) / density);
+    crowd /= shares[Technique::Merge as usize].max(f64::MIN_POSITIVE);
+    // What is merged at once is one find among 1 + M, and each has a (1 + M)th of its weight.
+    let at_once = if t.key.0 == Technique::Merge { 1.0 + crowd_at(t.key.1) } else { 1.0 };
+    let unguided = unguided.map_or(1.0, |plan| {
+        let cx = Context { plan, ..cx };
+        total(&products(&t.path.densities(cx), plan, cx.eta.into())) / density
+    });
     let steady = t.path.light_delta && t.path.vertices.len() == 1;
     (shares.iter().sum::<f64>().is_finite() && unguided.is_finite()).then_some(Evidence {
-        square: often * value * value / square,
+        square: often * at_once * value * value / square,
         shares,
+        crowd,
         unguided,
         steady,
         chain: None,
@@ -305,7 +321,14 @@ mod tests {
 
     #[test]
     fn luck_does_not_decide() {
-        let of = |square| Evidence { square, shares: [1.0, 0.0, 0.0, 0.0, 0.0], unguided: 1.0, steady: false, chain: None };
+        let of = |square| Evidence {
+            square,
+            shares: [1.0, 0.0, 0.0, 0.0, 0.0],
+            crowd: 0.0,
+            unguided: 1.0,
+            steady: false,
+            chain: None,
+        };
         let mut evidence: Vec<Evidence> = (0..1000).map(|_| of(1.0)).collect();
         clip(&mut evidence);
         assert!(evidence.iter().all(|e| e.square == 1.0));

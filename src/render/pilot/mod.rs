@@ -21,6 +21,7 @@ use crate::scene::emitter::Emission;
 use crate::scene::emitter::guide::{Guide, Start};
 use crate::scene::{Scene, Surface};
 use crate::transport::cache::{LightCache, LightVertex};
+use crate::transport::crowd::Crowds;
 use crate::transport::gather::{follow, gather};
 use crate::transport::incident::{Incident, Lesson};
 use crate::transport::settings::{Coupling, NO_BRANCHES, NO_SPLITS, Plan, Settings, Techniques};
@@ -66,8 +67,8 @@ pub struct Decisions {
     pub vertices_per_path: f64,
     /// Radius of merges in the first pass; 0 where there is nothing to merge.
     pub merge_radius: f32,
-    /// Mean number of light vertices that are merged at once in the first pass.
-    pub crowd: f32,
+    /// Where many light vertices are merged at once.
+    pub crowds: Arc<Crowds>,
     /// Where light paths start.
     pub guide: Guide,
     /// Where gathering walks find light, if they are to go there.
@@ -110,7 +111,7 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
             decisions.vertices_per_path = found.vertices as f64 / f64::from(paths);
         }
         if t.merge {
-            decisions.crowd = found.crowd;
+            decisions.crowds = Arc::new(found.crowds);
         }
         if settings.guided && t.shoots() {
             found.starts.iter().for_each(|(start, value)| learner.learn(start, *value));
@@ -137,8 +138,14 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
 
 impl Decisions {
     fn nothing(settings: &Settings) -> Self {
-        let (vertices_per_path, merge_radius, crowd) = (0.0, 0.0, 1.0);
-        Self { settings: settings.clone(), vertices_per_path, merge_radius, crowd, guide: Guide::default(), incident: None }
+        Self {
+            settings: settings.clone(),
+            vertices_per_path: 0.0,
+            merge_radius: 0.0,
+            crowds: Arc::default(),
+            guide: Guide::default(),
+            incident: None,
+        }
     }
 
     /// The counts that follow for a render of the crop window `crop`.
@@ -150,7 +157,7 @@ impl Decisions {
         Plan {
             guide: self.guide.clone(),
             incident,
-            crowd: self.crowd,
+            crowds: self.crowds.clone(),
             ..Plan::new(&settings, pixels, film, self.vertices_per_path)
         }
     }
@@ -163,7 +170,6 @@ impl Decisions {
         bytes.extend(self.settings.light_paths.unwrap_or(0).to_le_bytes());
         bytes.extend(self.vertices_per_path.to_bits().to_le_bytes());
         bytes.extend(self.merge_radius.to_bits().to_le_bytes());
-        bytes.extend(self.crowd.to_bits().to_le_bytes());
         bytes.extend(self.settings.faint.to_bits().to_le_bytes());
         bytes.extend(self.settings.chain_samples.to_le_bytes());
         bytes.push(u8::from(self.settings.guided_gathering));
@@ -245,33 +251,20 @@ impl Record for Splats<'_> {
 struct Joins<'a> {
     found: Vec<(f32, Technique, usize, u32)>,
     tracker: Tracker<'a>,
-    scene: &'a Scene,
-    /// There were events.
-    goes_on: bool,
-    /// Vertices that merge with all around.
-    merging: u64,
 }
 impl Observe for Joins<'_> {
     fn started(&mut self, from: Vec3, light: Option<&Emission>) {
-        self.goes_on = false;
         self.tracker.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
-        self.merging += u64::from(self.goes_on && !self.scene.materials.is_focused(surface.material));
         self.tracker.arrived(surface);
     }
     fn scattered(&mut self, s: &Scatter) {
-        self.goes_on = true;
         self.tracker.scattered(s);
     }
     fn returned(&mut self, _: usize) {
         // To a vertex that only Dirac events led to: no step was made there.
-        self.goes_on = false;
         self.tracker.last = NONE;
-    }
-    fn followed(&mut self, _: f32) {
-        // Nothing is merged along branches of chains.
-        self.goes_on = false;
     }
     fn joined(&mut self, join: Join<'_>) {
         self.found.push((join.value.mean(), join.technique, join.light_vertex, self.tracker.last));
@@ -330,7 +323,7 @@ struct Round {
     /// Light vertices.
     vertices: u64,
     /// How many a whole pass merges at once.
-    crowd: f32,
+    crowds: Crowds,
     /// What each light path that was of use is worth.
     starts: Vec<(Start, f64)>,
     /// Where light was found to arrive.
@@ -422,6 +415,7 @@ impl<'a> Pilot<'a> {
             owners.extend(shot.owners.into_iter().map(|(path, step)| (path, shifted(step, offset))));
             pieces.push(shot.vertices);
         }
+        let merging: Vec<Vec3> = pieces.iter().flatten().filter(|v| v.merges).map(|v| v.surface.p).collect();
         let cache = LightCache::new(pieces, plan.merge_radius);
         // Of N light paths and P pixels per pass, n light paths and n·P/N pixels take part.
         let pixels = f64::from(self.crop[2]) * f64::from(self.crop[3]);
@@ -429,7 +423,7 @@ impl<'a> Pilot<'a> {
         let walks = if plan.settings.techniques.gathers() { (pixels * share).ceil() as u32 } else { 0 };
         // Connections and merges of the whole pass are estimated from the light vertices of this part.
         plan.inv_light_paths = 1.0 / paths as f32;
-        let gathered: Vec<(Vec<Seen>, Trail, [u64; 2])> = (0..walks.div_ceil(JOB))
+        let gathered: Vec<(Vec<Seen>, Trail)> = (0..walks.div_ceil(JOB))
             .into_par_iter()
             .map(|job| self.gather(&plan, round, (job, walks), (&cache, &owners, share as f32), goes))
             .collect();
@@ -438,20 +432,18 @@ impl<'a> Pilot<'a> {
         for s in &seen {
             self.image[s.cell as usize] += f64::from(s.value);
         }
-        let mut crowd = [0u64; 2];
-        for s in gathered.iter().flat_map(|(seen, ..)| seen) {
+        for s in gathered.iter().flat_map(|(seen, _)| seen) {
             self.image[s.cell as usize] += f64::from(s.value) * share / eye_share;
         }
-        for (found, steps, merged) in gathered {
-            crowd = [0, 1].map(|i| crowd[i] + merged[i]);
+        for (found, steps) in gathered {
             let offset = trail.append(steps);
             seen.extend(found.into_iter().map(|s| Seen { steps: [shifted(s.steps[0], offset), s.steps[1]], ..s }));
         }
         let squares = self.squares();
         let relative = |s: &Seen| f64::from(s.value) / squares[s.cell as usize].max(f64::MIN_POSITIVE).sqrt();
         let incident = trail.lessons(seen.iter().flat_map(|s| s.steps.map(|step| (step, relative(s)))));
-        let crowd = (crowd[0] as f64 / (crowd[1].max(1) as f64 * share)) as f32;
-        Round { vertices: u64::from(cache.len()), crowd, starts: self.lessons(&squares, &seen, &starts), incident }
+        let crowds = Crowds::new(merging.into_iter(), plan.merge_radius, share as f32);
+        Round { vertices: u64::from(cache.len()), crowds, starts: self.lessons(&squares, &seen, &starts), incident }
     }
 
     /// Square of the coarse image per pixel, and a little more, so that black parts do not outweigh all.
@@ -530,8 +522,7 @@ impl<'a> Pilot<'a> {
         Shot { seen: observe.seen, starts: observe.starts, vertices, owners, trail: observe.tracker.trail }
     }
 
-    /// Gathers on `walks` pixels, with the light vertices of `share` of a pass; with what is seen and the trail, how many merges
-    /// there were at how many vertices.
+    /// Gathers on `walks` pixels, with the light vertices of `share` of a pass.
     fn gather(
         &self,
         plan: &Plan,
@@ -539,12 +530,11 @@ impl<'a> Pilot<'a> {
         (job, walks): (u32, u32),
         (cache, owners, share): (&LightCache, &[(u32, u32)], f32),
         goes: bool,
-    ) -> (Vec<Seen>, Trail, [u64; 2]) {
+    ) -> (Vec<Seen>, Trail) {
         let cx = Context::new(self.scene, plan, 0);
         let (mut seen, mut rays) = (vec![], RayCounts::default());
         let tracker = Tracker::new(self.scene, plan.settings.techniques.next_event, goes);
-        let mut joins = Joins { found: vec![], tracker, scene: self.scene, goes_on: false, merging: 0 };
-        let mut merges = 0;
+        let mut joins = Joins { found: vec![], tracker };
         for index in job * JOB..((job + 1) * JOB).min(walks) {
             // A walk's number beyond those of all light paths: the two never share a stream.
             let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 32, u64::from(round), plan.settings.seed);
@@ -556,7 +546,6 @@ impl<'a> Pilot<'a> {
             for (value, technique, vertex, step) in found.filter(|(value, ..)| value.is_finite()) {
                 // A whole pass connects each light vertex as often, since there are more of both walks; a
                 // merge finds the more gathering vertices, each to share with more light vertices.
-                merges += u64::from(technique == Technique::Merge);
                 let ((path, light_step), often) = match technique {
                     Technique::Connect => (owners[vertex], 1.0),
                     Technique::Merge => (owners[vertex], share),
@@ -565,6 +554,6 @@ impl<'a> Pilot<'a> {
                 seen.push(Seen { cell, value, path, often, steps: [step, light_step] });
             }
         }
-        (seen, joins.tracker.trail, [merges, joins.merging])
+        (seen, joins.tracker.trail)
     }
 }
