@@ -3,6 +3,8 @@
 //! is planted for the whole process.
 #![cfg(feature = "mutants")]
 
+#[path = "physics/caustic_room.rs"]
+mod caustic_room;
 #[path = "physics/lights.rs"]
 mod lights;
 #[path = "physics/mirrors.rs"]
@@ -235,6 +237,21 @@ fn planted_mistakes_split_in_full() {
     });
     println!("SplitInFull: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
     assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
+}
+
+/// `merging::a_caustic_that_is_met_by_chance_is_left_to_joins_that_see_it` notices merges that count in full.
+#[test]
+fn planted_mistakes_bring_noise_where_light_crowds() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let without = caustic_room::noise("hit,nee,splat,connect");
+    let [sound, mistaken] = [None, Some(Mutant::Crowd)].map(|m| {
+        plant(m);
+        let with = caustic_room::noise("hit,nee,splat,connect,merge");
+        plant(None);
+        with / without
+    });
+    println!("Crowd: variance {sound:.2} without, {mistaken:.2} with the mistake");
+    assert!(sound < 1.6 && mistaken > 1.6, "{sound} {mistaken}");
 }
 
 /// `lamps::lamps_are_divided_between_hits_and_splats` notices one that both find.

@@ -1,8 +1,12 @@
-//! How many light vertices a merge finds at once, by place.
+//! How many more light vertices than usual a merge finds at once, by place.
 //!
 //! All that a gathering vertex merges shares the chance that the walk came there. Where a caustic is bright, a merge is one
 //! find and not the many that its density counts ([`super::mis`]), so weights must know how crowded a place is. They may
 //! know it from anything but the samples that they weigh: from what a pilot shot.
+//!
+//! With M light vertices in the disk around a gathering vertex, on average and given where it is, the second moment of their
+//! number is M + M². But what is found wherever walks go is no noise: with M̄ the mean of M over gathering vertices, the
+//! variance E[M + M²] − M̄² = E[M·(1 + M − M̄)] is that of finds of which 1 + M − M̄ count as one.
 
 use crate::math::random::mix;
 use glam::{IVec3, Vec3};
@@ -13,19 +17,21 @@ const SIDE: f32 = 4.0;
 /// the place.
 const BUCKETS: usize = 4;
 
-/// Mean number of light vertices within the radius of the first pass, as a function of the place that is constant in cells.
+/// Mean number M of light vertices within the radius of the first pass, as a function of the place that is constant in cells.
 #[derive(Clone, Debug, Default)]
 pub struct Crowds {
     inv_side: f32,
     /// By the hash of a cell.
     crowds: Vec<f32>,
+    /// M̄.
+    usual: f32,
 }
 
 impl Crowds {
     /// From the points of a part of a pass, which `share` of its light paths left; `radius` > 0 is that of the first pass.
     pub fn new(points: impl ExactSizeIterator<Item = Vec3>, radius: f32, share: f32) -> Self {
         let buckets = (BUCKETS * points.len()).next_power_of_two();
-        let mut found = Self { inv_side: 1.0 / (SIDE * radius), crowds: vec![0.0; buckets] };
+        let mut found = Self { inv_side: 1.0 / (SIDE * radius), crowds: vec![0.0; buckets], usual: 0.0 };
         // A surface fills a cell with about the square of its side.
         let each = std::f32::consts::PI / (SIDE * SIDE * share);
         for p in points {
@@ -42,10 +48,15 @@ impl Crowds {
         mix(plane ^ u64::from(z as u32).wrapping_mul(0x9e37_79b9_7f4a_7c15)) as usize & (self.crowds.len() - 1)
     }
 
-    /// How crowded `p` is; 0 where nothing is known.
+    /// The same where gathering vertices find so many on average.
+    pub fn with_usual(self, usual: f32) -> Self {
+        Self { usual, ..self }
+    }
+
+    /// M − M̄ at `p`, or 0 where there are fewer or nothing is known.
     #[inline]
     pub fn at(&self, p: Vec3) -> f32 {
-        if self.crowds.is_empty() { 0.0 } else { self.crowds[self.bucket(p)] }
+        if self.crowds.is_empty() { 0.0 } else { (self.crowds[self.bucket(p)] - self.usual).max(0.0) }
     }
 }
 
@@ -71,6 +82,10 @@ mod tests {
             let expected = per_area * disk;
             assert!((mean(x) / expected - 1.0).abs() < 0.2, "{} instead of {expected}", mean(x));
         }
+        let few = mean(-0.45);
+        let crowds = crowds.with_usual(2.0 * few);
+        assert_eq!(crowds.at(Vec3::new(-0.45, 0.3, 0.05)), 0.0);
+        assert!(crowds.at(Vec3::new(0.45, 0.3, 0.05)) > few);
         assert_eq!(Crowds::default().at(Vec3::ONE), 0.0);
         let far = Crowds::new([Vec3::splat(f32::NAN), Vec3::splat(1e30)].into_iter(), 1e-20, 1.0);
         assert!(far.at(Vec3::splat(1e30)) > 0.0);

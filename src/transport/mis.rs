@@ -71,8 +71,8 @@ impl Heuristic {
     }
 }
 
-/// What a merge counts for in the weights where a gathering walk came by chance: with `crowd` = M light vertices there on
-/// average, which are merged at once or not at all, the second moment is that of η/(1 + M) independent finds.
+/// What a merge counts for in the weights where a gathering walk came by chance and finds `crowd` light vertices more than
+/// usual ([`super::crowd`]): so many and one are merged at once or not at all, and their variance is that of a single find.
 #[inline(always)]
 pub fn count_by_chance<R: Real>(eta: R, crowd: R) -> R {
     eta / (R::ONE + crowd)

@@ -32,6 +32,8 @@ pub enum Mutant {
     LearnedDensity = 12,
     /// Where a walk splits, both ways count in full.
     SplitInFull = 13,
+    /// A merge that is met by chance counts in full however many it finds at once.
+    Crowd = 14,
 }
 
 #[cfg(feature = "mutants")]

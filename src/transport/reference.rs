@@ -65,7 +65,7 @@ pub struct Densities {
     pub delta: Vec<bool>,
     /// Which are that or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
     pub focused: Vec<bool>,
-    /// Light vertices that a merge at each finds at once.
+    /// How many more light vertices than usual a merge at each finds at once.
     pub crowd: Vec<f64>,
 }
 

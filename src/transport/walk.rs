@@ -46,7 +46,7 @@ impl<'a> Context<'a> {
         Self { scene, plan, merge_radius2, eta, crowded, chain_part: 1.0 }
     }
 
-    /// Light vertices that a merge at `p` finds at once, on average.
+    /// How many more light vertices than usual a merge at `p` finds at once, on average.
     #[inline]
     pub fn crowd(&self, p: Vec3) -> f32 {
         self.plan.crowds.at(p) * self.crowded
@@ -55,7 +55,7 @@ impl<'a> Context<'a> {
     /// What a merge at `p` counts for in the weights, where all events between it and the eye are focused (`clear`) or not.
     #[inline]
     pub fn merge_count(&self, p: Vec3, clear: bool) -> f32 {
-        if clear { self.eta } else { mis::count_by_chance(self.eta, self.crowd(p)) }
+        if clear || planted(Mutant::Crowd) { self.eta } else { mis::count_by_chance(self.eta, self.crowd(p)) }
     }
 
     /// The same where a pixel has so many samples of chains.

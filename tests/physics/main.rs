@@ -2,6 +2,7 @@
 //! definition, furnaces, closed forms, and planted mistakes that must be caught.
 
 mod agreement;
+mod caustic_room;
 mod chains;
 mod choice;
 mod determinism;

@@ -1,5 +1,6 @@
 //! Merges: what they find is what hits find, and what nothing else finds has a closed form.
 
+use crate::caustic_room::noise;
 use crate::support::{Effort, scene, seed, series};
 use crate::{mirrors, scenes};
 use nephroid::render::{Options, Render};
@@ -68,4 +69,13 @@ fn radius_shrinks_as_it_must() {
     assert!((radius(0) - 0.5).abs() < 1e-6);
     // Bias falls with r² ~ n^(−1/3), variance with 1/(n r²) ~ n^(−2/3).
     assert!((radius(63) / radius(0) - 0.5).abs() < 1e-3 && (radius(999_999) / radius(0) - 0.1).abs() < 1e-3);
+}
+
+/// Gathering walks seldom come upon the caustic, and then merge all of it at once. Connections see it from everywhere; merges must
+/// leave it to them.
+#[test]
+fn a_caustic_that_is_met_by_chance_is_left_to_joins_that_see_it() {
+    let (without, with) = (noise("hit,nee,splat,connect"), noise("hit,nee,splat,connect,merge"));
+    println!("variance with merges over that without: {:.3}", with / without);
+    assert!(with < 1.6 * without, "{with} with merges, {without} without");
 }

@@ -39,7 +39,7 @@ pub(super) struct Evidence {
     pub(super) square: f64,
     /// r_τ by the number of the join.
     pub(super) shares: [f64; Technique::ALL.len()],
-    /// M: light vertices that its merges find at once and by chance, as a whole pass has them.
+    /// How many more light vertices than usual its merges find at once and by chance, as a whole pass has them.
     pub(super) crowd: f64,
     /// Without noise where next events are on: a delta light seen at the first vertex.
     pub(super) steady: bool,
@@ -298,7 +298,7 @@ fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square:
         crowd += if *technique == Technique::Merge { share * crowd_at(*s) } else { 0.0 };
     }
     crowd /= shares[Technique::Merge as usize].max(f64::MIN_POSITIVE);
-    // What is merged at once is one find among 1 + M, and each has a (1 + M)th of its weight.
+    // What is merged at once is one find, and each part of it has but a part of the weight.
     let at_once = if t.key.0 == Technique::Merge { 1.0 + crowd_at(t.key.1) } else { 1.0 };
     let unguided = unguided.map_or(1.0, |plan| {
         let cx = Context { plan, ..cx };

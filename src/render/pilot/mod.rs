@@ -251,22 +251,32 @@ impl Record for Splats<'_> {
 struct Joins<'a> {
     found: Vec<(f32, Technique, usize, u32)>,
     tracker: Tracker<'a>,
+    scene: &'a Scene,
+    /// Not all events were focused: what is merged is met by chance.
+    by_chance: bool,
+    /// Vertices that merge with all around, and how many they find.
+    met: [u64; 2],
 }
 impl Observe for Joins<'_> {
     fn started(&mut self, from: Vec3, light: Option<&Emission>) {
+        self.by_chance = false;
         self.tracker.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
+        self.met[0] += u64::from(self.by_chance && !self.scene.materials.is_focused(surface.material));
         self.tracker.arrived(surface);
     }
     fn scattered(&mut self, s: &Scatter) {
+        self.by_chance |= !s.focused;
         self.tracker.scattered(s);
     }
     fn returned(&mut self, _: usize) {
         // To a vertex that only Dirac events led to: no step was made there.
+        self.by_chance = false;
         self.tracker.last = NONE;
     }
     fn joined(&mut self, join: Join<'_>) {
+        self.met[1] += u64::from(self.by_chance && join.technique == Technique::Merge);
         self.found.push((join.value.mean(), join.technique, join.light_vertex, self.tracker.last));
     }
 }
@@ -322,7 +332,7 @@ struct Shot {
 struct Round {
     /// Light vertices.
     vertices: u64,
-    /// How many a whole pass merges at once.
+    /// How many more than usual a whole pass merges at once.
     crowds: Crowds,
     /// What each light path that was of use is worth.
     starts: Vec<(Start, f64)>,
@@ -423,7 +433,7 @@ impl<'a> Pilot<'a> {
         let walks = if plan.settings.techniques.gathers() { (pixels * share).ceil() as u32 } else { 0 };
         // Connections and merges of the whole pass are estimated from the light vertices of this part.
         plan.inv_light_paths = 1.0 / paths as f32;
-        let gathered: Vec<(Vec<Seen>, Trail)> = (0..walks.div_ceil(JOB))
+        let gathered: Vec<(Vec<Seen>, Trail, [u64; 2])> = (0..walks.div_ceil(JOB))
             .into_par_iter()
             .map(|job| self.gather(&plan, round, (job, walks), (&cache, &owners, share as f32), goes))
             .collect();
@@ -432,17 +442,20 @@ impl<'a> Pilot<'a> {
         for s in &seen {
             self.image[s.cell as usize] += f64::from(s.value);
         }
-        for s in gathered.iter().flat_map(|(seen, _)| seen) {
+        for s in gathered.iter().flat_map(|(seen, ..)| seen) {
             self.image[s.cell as usize] += f64::from(s.value) * share / eye_share;
         }
-        for (found, steps) in gathered {
+        let mut met = [0u64; 2];
+        for (found, steps, more) in gathered {
+            met = [0, 1].map(|i| met[i] + more[i]);
             let offset = trail.append(steps);
             seen.extend(found.into_iter().map(|s| Seen { steps: [shifted(s.steps[0], offset), s.steps[1]], ..s }));
         }
         let squares = self.squares();
         let relative = |s: &Seen| f64::from(s.value) / squares[s.cell as usize].max(f64::MIN_POSITIVE).sqrt();
         let incident = trail.lessons(seen.iter().flat_map(|s| s.steps.map(|step| (step, relative(s)))));
-        let crowds = Crowds::new(merging.into_iter(), plan.merge_radius, share as f32);
+        let usual = met[1] as f64 / (met[0].max(1) as f64 * share);
+        let crowds = Crowds::new(merging.into_iter(), plan.merge_radius, share as f32).with_usual(usual as f32);
         Round { vertices: u64::from(cache.len()), crowds, starts: self.lessons(&squares, &seen, &starts), incident }
     }
 
@@ -522,7 +535,8 @@ impl<'a> Pilot<'a> {
         Shot { seen: observe.seen, starts: observe.starts, vertices, owners, trail: observe.tracker.trail }
     }
 
-    /// Gathers on `walks` pixels, with the light vertices of `share` of a pass.
+    /// Gathers on `walks` pixels, with the light vertices of `share` of a pass; with what is seen and the trail, how many vertices
+    /// merged by chance, and how many they found.
     fn gather(
         &self,
         plan: &Plan,
@@ -530,11 +544,11 @@ impl<'a> Pilot<'a> {
         (job, walks): (u32, u32),
         (cache, owners, share): (&LightCache, &[(u32, u32)], f32),
         goes: bool,
-    ) -> (Vec<Seen>, Trail) {
+    ) -> (Vec<Seen>, Trail, [u64; 2]) {
         let cx = Context::new(self.scene, plan, 0);
         let (mut seen, mut rays) = (vec![], RayCounts::default());
         let tracker = Tracker::new(self.scene, plan.settings.techniques.next_event, goes);
-        let mut joins = Joins { found: vec![], tracker };
+        let mut joins = Joins { found: vec![], tracker, scene: self.scene, by_chance: false, met: [0; 2] };
         for index in job * JOB..((job + 1) * JOB).min(walks) {
             // A walk's number beyond those of all light paths: the two never share a stream.
             let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 32, u64::from(round), plan.settings.seed);
@@ -554,6 +568,6 @@ impl<'a> Pilot<'a> {
                 seen.push(Seen { cell, value, path, often, steps: [step, light_step] });
             }
         }
-        (seen, joins.tracker.trail)
+        (seen, joins.tracker.trail, joins.met)
     }
 }
