@@ -53,6 +53,11 @@ impl Crowds {
         Self { usual, ..self }
     }
 
+    /// M̄.
+    pub fn usual(&self) -> f32 {
+        self.usual
+    }
+
     /// M − M̄ at `p`, or 0 where there are fewer or nothing is known.
     #[inline]
     pub fn at(&self, p: Vec3) -> f32 {

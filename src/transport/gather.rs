@@ -131,7 +131,7 @@ fn go_on<R: Record, O: Observe>(
             if let Some(picked) = picked {
                 connect(cx, &walk, &vertex, partial, (lights, picked), random, tally);
             }
-            if walk.length > 0 && !vertex.focused && cx.merge_radius2 > 0.0 {
+            if walk.length > 0 && !vertex.focused && cx.merges() {
                 merge(cx, &walk, &vertex, partial, lights, tally);
             }
         }
@@ -398,7 +398,7 @@ fn connect<R: Record, O: Observe>(
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
         // The vertex on the light's side of a merge is focused; which of the two ends that is, is known here.
-        let merged = |possible: bool, p, clear| if possible && cx.eta > 0.0 { h.raise(cx.merge_count(p, clear)) } else { 0.0 };
+        let merged = |possible: bool, p, clear| if possible && cx.merges() { h.raise(cx.merge_count(p, clear)) } else { 0.0 };
         let clear = walk.clear && vertex.focused;
         let at_eye = merged(walk.length > 0 && !vertex.focused && light.focused, vertex.surface.p, walk.clear);
         let at_light = merged(y.merges, y.surface.p, clear);
@@ -472,9 +472,9 @@ fn merge<R: Record, O: Observe>(
     let plan = cx.plan;
     let h = plan.settings.heuristic;
     // Of η, the area of the disk and the number of light paths.
-    let factor = plan.light_paths as f32 * plan.inv_light_paths / cx.eta;
+    let factor = plan.light_paths as f32 * plan.inv_light_paths / cx.eta.count(walk.clear, 0.0);
     let mut count = None;
-    lights.around(vertex.surface.p, cx.merge_radius2, |index, y| {
+    lights.around(vertex.surface.p, cx.merge_radius2(walk.clear), |index, y| {
         let length = walk.length + 1 + u32::from(y.length);
         if !plan.wants_length(length) || y.surface.n_g.dot(vertex.surface.n_g).abs() < SAME_SURFACE {
             return;

@@ -27,7 +27,7 @@
 //! Two vertices in a corner that light reaches by way of a caustic are badly joined by a connection, whose 1/d² nothing bounds;
 //! a merge at the second is not. But a gathering walk that comes upon a caustic by chance merges all of it at once. By its density a merge would seem
 //! the best of all joins there, though all that is merged shares the one chance [Grittmann 2021]: so it counts
-//! for less where not all events between it and the eye are focused ([`count_by_chance`]), the more so the more crowded the place
+//! for less where not all events between it and the eye are focused ([`Eta::count`]), the more so the more crowded the place
 //! is ([`super::crowd`]). The shooting walker does not know that before the eye is reached, and carries the difference apart.
 //!
 //! The power heuristic (exponent 2) is the same recursion with every density and count squared.
@@ -71,11 +71,29 @@ impl Heuristic {
     }
 }
 
-/// What a merge counts for in the weights where a gathering walk came by chance and finds `crowd` light vertices more than
-/// usual ([`super::crowd`]): so many and one are merged at once or not at all, and their variance is that of a single find.
-#[inline(always)]
-pub fn count_by_chance<R: Real>(eta: R, crowd: R) -> R {
-    eta / (R::ONE + crowd)
+/// η = Nπr² of merges, whose radius is smaller where they are met by chance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eta<R> {
+    /// Where all is focused between the eye and the merge.
+    pub clear: R,
+    /// Elsewhere.
+    pub by_chance: R,
+}
+
+impl<R: Real> Eta<R> {
+    /// What a merge counts for in the weights, where all is focused between the eye and it (`clear`), or where a gathering walk came by
+    /// chance and finds `crowd` light vertices more than usual ([`super::crowd`]): so many and one are merged at once or not at all, and
+    /// their variance is that of a single find.
+    #[inline(always)]
+    pub fn count(self, clear: bool, crowd: R) -> R {
+        if clear { self.clear } else { self.by_chance / (R::ONE + crowd) }
+    }
+}
+
+impl From<Eta<f32>> for Eta<f64> {
+    fn from(eta: Eta<f32>) -> Self {
+        Self { clear: eta.clear.into(), by_chance: eta.by_chance.into() }
+    }
 }
 
 /// Partial sum of a subpath on arrival at a vertex: `a + b·raise(p_rev)`.

@@ -8,7 +8,7 @@
 //! with `G_i = g_1 … g_i` and `S_i = s_i … s_k`. In f64 and quadratic in the length: the recursion of
 //! [`super::mis`] is tested against it. A [`Witness`] watches walks and rebuilds their paths.
 
-use super::mis;
+use super::mis::{self, Eta};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
 use super::walk::{Context, Join, Observe};
@@ -152,7 +152,7 @@ fn jacobian(from: Vec3, to: &Surface) -> f64 {
 }
 
 /// The density of every join: how many such paths it makes per sample and product of areas; `eta` as in [`Context`].
-pub fn products(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+pub fn products(d: &Densities, plan: &Plan, eta: Eta<f64>) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let gathered = |i: usize| d.g[1..=i].iter().product::<f64>();
@@ -181,7 +181,7 @@ pub fn products(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
 }
 
 /// Weights from the products of densities; `eta` as in [`Context`].
-pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+pub fn weights(d: &Densities, plan: &Plan, eta: Eta<f64>) -> Vec<(JoinKey, f64)> {
     let h = plan.settings.heuristic;
     let mut joins = products(d, plan, eta);
     let total: f64 = joins.iter().map(|j| h.raise(j.1)).sum();
@@ -192,13 +192,9 @@ pub fn weights(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
 }
 
 /// What a merge at v_i counts for: 0 where there is none, since it is seen directly, is focused itself, or lit by what is not.
-fn merged_at(d: &Densities, i: usize, eta: f64) -> f64 {
+fn merged_at(d: &Densities, i: usize, eta: Eta<f64>) -> f64 {
     let possible = i > 1 && !d.focused[i] && d.focused[i + 1];
-    match possible {
-        true if d.is_clear(i) => eta,
-        true => mis::count_by_chance(eta, d.crowd[i]),
-        false => 0.0,
-    }
+    if possible { eta.count(d.is_clear(i), d.crowd[i]) } else { 0.0 }
 }
 
 impl Densities {
@@ -209,7 +205,7 @@ impl Densities {
 }
 
 /// The same weights by the recursion of [`mis`], on numbers instead of walks.
-pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: f64) -> Vec<(JoinKey, f64)> {
+pub fn weights_by_recursion(d: &Densities, plan: &Plan, eta: Eta<f64>) -> Vec<(JoinKey, f64)> {
     let k = d.g.len() - 1;
     let t = plan.settings.techniques;
     let h = plan.settings.heuristic;

@@ -211,6 +211,8 @@ pub struct Plan {
     pub c: f32,
     /// Radius of merges in the first pass; 0 where nothing is merged.
     pub merge_radius: f32,
+    /// Merges that are met by chance have this part of the area of others.
+    pub by_chance: f32,
     /// Where many light vertices are merged at once.
     pub crowds: Arc<Crowds>,
     /// Reverse densities matter: both walkers take part in the weights.
@@ -252,6 +254,7 @@ impl Plan {
             n,
             c,
             merge_radius: if t.merge { settings.merge_radius.unwrap_or(0.0) } else { 0.0 },
+            by_chance: 1.0,
             crowds: Arc::default(),
             two_sided: light_paths > 0 && t.gathers(),
             shares_lamps: t.splat && t.hit,

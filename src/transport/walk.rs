@@ -6,7 +6,7 @@
 
 use super::cache::LightVertex;
 use super::class::{PathFilter, Positions, Symbol};
-use super::mis::{self, Partial};
+use super::mis::{self, Eta, Partial};
 use super::mutant::{Mutant, planted};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
@@ -26,12 +26,12 @@ pub struct Context<'a> {
     pub scene: &'a Scene,
     /// Which joins, how many.
     pub plan: &'a Plan,
-    /// Square of the radius in which this pass merges; 0 where it does not.
-    pub merge_radius2: f32,
+    /// Square of the radius in which this pass merges, at most; 0 where it does not.
+    merge_radius2: f32,
     /// η of this pass: light paths times the area in which their vertices are merged.
-    pub eta: f32,
-    /// Light vertices in the radius of this pass, for one in that of the first.
-    pub crowded: f32,
+    pub eta: Eta<f32>,
+    /// Light vertices in the radius of this pass where merges are met by chance, for one in the largest of the first.
+    crowded: f32,
     /// Part of what comes along chains of Dirac events (E S* L) that a sample counts: where several samples of chains
     /// belong to one gathering walk ([`super::chain::sample`]), one by their number.
     pub chain_part: f32,
@@ -41,9 +41,27 @@ impl<'a> Context<'a> {
     /// For one pass of a render.
     pub fn new(scene: &'a Scene, plan: &'a Plan, pass: u64) -> Self {
         let merge_radius2 = plan.merge_radius(pass).powi(2);
-        let eta = plan.light_paths as f32 * std::f32::consts::PI * merge_radius2;
-        let crowded = merge_radius2 / plan.merge_radius(0).powi(2).max(f32::MIN_POSITIVE);
+        let clear = plan.light_paths as f32 * std::f32::consts::PI * merge_radius2;
+        let eta = Eta { clear, by_chance: clear * plan.by_chance };
+        let crowded = plan.by_chance * merge_radius2 / plan.merge_radius(0).powi(2).max(f32::MIN_POSITIVE);
         Self { scene, plan, merge_radius2, eta, crowded, chain_part: 1.0 }
+    }
+
+    /// The same for another plan, of the same radius.
+    pub fn with_plan(self, plan: &'a Plan) -> Self {
+        Self { plan, ..self }
+    }
+
+    /// Vertices are merged in this pass.
+    #[inline]
+    pub fn merges(&self) -> bool {
+        self.merge_radius2 > 0.0
+    }
+
+    /// Square of the radius in which vertices are merged where all events between them and the eye are focused (`clear`), or not.
+    #[inline]
+    pub fn merge_radius2(&self, clear: bool) -> f32 {
+        if clear { self.merge_radius2 } else { self.plan.by_chance * self.merge_radius2 }
     }
 
     /// How many more light vertices than usual a merge at `p` finds at once, on average.
@@ -55,7 +73,8 @@ impl<'a> Context<'a> {
     /// What a merge at `p` counts for in the weights, where all events between it and the eye are focused (`clear`) or not.
     #[inline]
     pub fn merge_count(&self, p: Vec3, clear: bool) -> f32 {
-        if clear || planted(Mutant::Crowd) { self.eta } else { mis::count_by_chance(self.eta, self.crowd(p)) }
+        let crowd = if clear || planted(Mutant::Crowd) { 0.0 } else { self.crowd(p) };
+        self.eta.count(clear, crowd)
     }
 
     /// The same where a pixel has so many samples of chains.
@@ -181,12 +200,12 @@ impl Walk {
         let resolved =
             |partial: Partial<f32>| if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
         self.k = resolved(if equation == Equation::Rendering { sums.at(s.focused) } else { sums.partial });
-        self.merges = (equation == Equation::Rendering && self.length > 0 && !s.focused && cx.eta > 0.0).then_some(self.clear);
+        self.merges = (equation == Equation::Rendering && self.length > 0 && !s.focused && cx.merges()).then_some(self.clear);
         self.merge = match equation {
             Equation::Rendering => 0.0,
             Equation::Potential if s.focused => resolved(Partial { a: 0.0, b: sums.merged }),
             // There is one if the event before was, and it counts for more if all that comes is.
-            Equation::Potential if self.focused && cx.eta > 0.0 && !planted(Mutant::MergeWeight) => {
+            Equation::Potential if self.focused && cx.merges() && !planted(Mutant::MergeWeight) => {
                 let [clear, by_chance] = [true, false].map(|clear| h.raise(cx.merge_count(vertex.surface.p, clear)));
                 self.k += by_chance;
                 clear - by_chance

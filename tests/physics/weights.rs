@@ -8,7 +8,7 @@ use nephroid::math::random::Family;
 use nephroid::transport::cache::LightCache;
 use nephroid::transport::crowd::Crowds;
 use nephroid::transport::gather::gather;
-use nephroid::transport::mis::Heuristic;
+use nephroid::transport::mis::{Eta, Heuristic};
 use nephroid::transport::reference::{Densities, Testimony, Witness, weights, weights_by_recursion};
 use nephroid::transport::settings::{Plan, Settings, Techniques};
 use nephroid::transport::shoot::shoot;
@@ -50,7 +50,8 @@ fn recursion_is_the_definition_for_100_000_random_paths() {
     let mut tested = 0;
     while tested < 100_000 {
         let (d, plan) = random_path(&mut random);
-        let eta = f64::from(plan.light_paths) * std::f64::consts::PI * f64::from(plan.merge_radius(0)).powi(2);
+        let clear = f64::from(plan.light_paths) * std::f64::consts::PI * f64::from(plan.merge_radius(0)).powi(2);
+        let eta = Eta { clear, by_chance: clear * f64::from(random.unit()) };
         let defined = weights(&d, &plan, eta);
         let total: f64 = defined.iter().map(|w| w.1).sum();
         if total == 0.0 {
@@ -80,7 +81,7 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
         shoot(Context::new(&world, &plan, 0), Some(&mut shot), &mut Random::new(Family::Other, i, 0, seed()), &mut tally);
     }
     let points: Vec<Vec3> = shot.iter().map(|v| v.surface.p).collect();
-    let plan = Plan { crowds: Arc::new(Crowds::new(points.into_iter(), 0.1, 0.05)), ..plan };
+    let plan = Plan { by_chance: 0.4, crowds: Arc::new(Crowds::new(points.into_iter(), 0.1, 0.05)), ..plan };
     // One pass for all, so that one η belongs to all weights.
     let cx = Context::new(&world, &plan, 0);
     let (mut witness, mut rays) = (Witness::default(), RayCounts::default());

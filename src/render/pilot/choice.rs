@@ -19,7 +19,7 @@
 use super::branching::LEAST;
 use super::chains::{ChainNoise, SAMPLES};
 use super::evidence::{Evidence, Findings};
-use super::{Decisions, Pilot};
+use super::{Decisions, Pilot, part_by_chance};
 use crate::transport::Technique;
 use crate::transport::mis::Heuristic;
 use crate::transport::settings::{Plan, Settings, Techniques};
@@ -76,6 +76,33 @@ struct Candidate {
     merge: bool,
 }
 
+/// What the paths were found by that judge candidates.
+struct Mixture {
+    /// Per pixel.
+    light_paths: f64,
+    /// Light vertices within the largest radius of merges.
+    usual: f64,
+    /// Part of the area in which they are merged by chance.
+    by_chance: f64,
+}
+
+impl Mixture {
+    fn of(plan: &Plan, pixels: u32) -> Self {
+        let light_paths = f64::from(plan.light_paths) / f64::from(pixels);
+        Self { light_paths, usual: plan.crowds.usual().into(), by_chance: plan.by_chance.into() }
+    }
+
+    /// How many times its light paths `light_paths` per pixel are.
+    fn times(&self, light_paths: f64) -> f64 {
+        if self.light_paths > 0.0 { light_paths / self.light_paths } else { 0.0 }
+    }
+
+    /// How many more merges are met by chance with `n` times the light paths.
+    fn by_chance(&self, n: f64) -> f64 {
+        n * part_by_chance(n * self.usual) / self.by_chance
+    }
+}
+
 impl Candidate {
     fn all(settings: &Settings, pixels: u32) -> Vec<Self> {
         let allowed = settings.techniques;
@@ -101,19 +128,23 @@ impl Candidate {
         Self { light_paths, next_event: t.next_event, connect: t.connect, merge: t.merge }
     }
 
-    /// Of a pass, from what a mixture of all joins found that had `mixed` light paths per pixel.
-    fn noise(&self, evidence: &[Evidence], mixed: f64) -> f64 {
+    /// Of a pass, from what the mixture of all joins found.
+    fn noise(&self, evidence: &[Evidence], mixture: &Mixture) -> f64 {
         let on = |b: bool| if b { 1.0 } else { 0.0 };
-        let n = self.light_paths / mixed;
+        let n = mixture.times(self.light_paths);
         // Where merges find a crowd at once, more light paths make it larger, not more often found.
-        let merges = |crowd: f64| on(self.merge) * n * (1.0 + crowd) / (1.0 + n * crowd);
+        let chance = mixture.by_chance(n);
+        let merges = |e: &Evidence| {
+            let by_chance = chance * (1.0 + e.crowd) / (1.0 + chance * e.crowd);
+            on(self.merge) * (n * (1.0 - e.by_chance) + by_chance * e.by_chance)
+        };
         let numbers = |e: &Evidence| {
             Technique::ALL.map(|technique| match technique {
                 Technique::Hit => 1.0,
                 Technique::NextEvent => on(self.next_event),
                 Technique::Connect => on(self.connect),
                 Technique::Splat => n,
-                Technique::Merge => merges(e.crowd),
+                Technique::Merge => merges(e),
             })
         };
         let one = |e: &Evidence| {
@@ -130,7 +161,9 @@ impl Candidate {
     }
 
     /// Per pixel.
-    fn cost(&self, found: &Findings) -> f64 {
+    fn cost(&self, found: &Findings, mixture: &Mixture) -> f64 {
+        let n = mixture.times(self.light_paths);
+        let merges = n * found.merges.clear + mixture.by_chance(n) * found.merges.by_chance;
         let (eye, light) = (&found.eye, &found.light);
         let c = COSTS;
         let on = |b: bool, cost: f64| if b { cost } else { 0.0 };
@@ -139,7 +172,7 @@ impl Candidate {
         c.gather_walk
             + c.gather_step * eye.steps
             + at_eye * eye.ends
-            + on(self.merge, c.merge * self.light_paths * found.merges)
+            + on(self.merge, c.merge * merges)
             + self.light_paths * (c.shoot_walk + c.shoot_step * light.steps + at_light * light.ends)
     }
 
@@ -161,7 +194,7 @@ impl Candidate {
 pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool {
     let mut plan = pilot.plan(decisions);
     plan.settings.heuristic = Heuristic::Balance;
-    let candidate = Candidate::of(&plan, pilot.pixels());
+    let (candidate, mixture) = (Candidate::of(&plan, pilot.pixels()), Mixture::of(&plan, pilot.pixels()));
     // Gathering walks are more than light paths where those are few.
     let part = if plan.light_paths > 0 { candidate.light_paths.clamp(0.125, 1.0) } else { 1.0 };
     let paths = (f64::from(most) * part) as u32;
@@ -170,7 +203,7 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
         let one = |e: &Evidence| e.square / if unguided { e.unguided.max(LOST) } else { 1.0 };
         candidate.noisy(&found.evidence).map(one).sum::<f64>()
     };
-    let cost = candidate.cost(&found);
+    let cost = candidate.cost(&found, &mixture);
     let more = COSTS.directions * (found.eye.ends + candidate.light_paths * found.light.ends);
     noise(false) * (cost + more) * GUIDE_MUST_WIN < noise(true) * cost
 }
@@ -182,18 +215,18 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
     if pilot.settings.follows_chains() {
         plan.settings.faint = LEAST;
     }
-    let (light_paths, dark_squares) = (plan.light_paths, pilot.dark_squares());
+    let dark_squares = pilot.dark_squares();
+    let mixture = Mixture::of(&plan, pilot.pixels());
     let chains = ChainNoise::measured(pilot, &plan, &dark_squares);
     let found = Findings::collected(pilot, plan, &dark_squares, paths);
     let branchings = found.branchings(pilot.settings.faint);
     let ways: Vec<_> = branchings.iter().flat_map(|b| SAMPLES.map(|samples| (b, samples))).collect();
     let pixels = pilot.pixels();
     let candidates = Candidate::all(pilot.settings, pixels);
-    let mixed = f64::from(light_paths) / f64::from(pixels);
     let judged = candidates.iter().flat_map(|c| {
         let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };
         let lacks = if c.next_event && c.connect { 1.0 } else { LESS_MUST_WIN };
-        let (noise, cost) = (c.noise(&found.evidence, mixed), c.cost(&found));
+        let (noise, cost) = (c.noise(&found.evidence, &mixture), c.cost(&found, &mixture));
         ways.iter().map(move |(b, samples)| {
             let noise = noise + chains.noise(b, *samples);
             let cost = cost + COSTS.branch * b.rays + chains.cost(*samples, COSTS.look, COSTS.branch);

@@ -4,10 +4,10 @@ use super::branching::{BranchRays, Branching};
 use super::{Cell, JOB, Pilot};
 use crate::math::random::Family;
 use crate::math::{Random, limit};
-use crate::scene::Surface;
+use crate::scene::{Scene, Surface};
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
-use crate::transport::reference::{JoinKey, Subpath, Testimony, Witness, products};
+use crate::transport::reference::{JoinKey, Path, PathVertex, Subpath, Testimony, Witness, products};
 use crate::transport::settings::Plan;
 use crate::transport::shoot::shoot;
 use crate::transport::vertex::Scatter;
@@ -39,7 +39,9 @@ pub(super) struct Evidence {
     pub(super) square: f64,
     /// r_τ by the number of the join.
     pub(super) shares: [f64; Technique::ALL.len()],
-    /// How many more light vertices than usual its merges find at once and by chance, as a whole pass has them.
+    /// Part of the merges' r that is met by chance.
+    pub(super) by_chance: f64,
+    /// How many more light vertices than usual such merges find at once, as a whole pass has them.
     pub(super) crowd: f64,
     /// Without noise where next events are on: a delta light seen at the first vertex.
     pub(super) steady: bool,
@@ -124,7 +126,16 @@ struct Found {
     evidence: Vec<Evidence>,
     counts: Counts,
     branches: BranchRays,
-    merges: f64,
+    merges: Merges,
+}
+
+/// Numbers of merges.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Merges {
+    /// Where all is focused between them and the eye.
+    pub(super) clear: f64,
+    /// Elsewhere.
+    pub(super) by_chance: f64,
 }
 
 impl Found {
@@ -133,7 +144,8 @@ impl Found {
         self.counts.walks += other.counts.walks;
         self.counts.steps += other.counts.steps;
         self.counts.ends += other.counts.ends;
-        self.merges += other.merges;
+        self.merges.clear += other.merges.clear;
+        self.merges.by_chance += other.merges.by_chance;
         self.branches.join(other.branches);
         self
     }
@@ -152,8 +164,8 @@ pub(super) struct Findings {
     pub(super) eye: Counts,
     /// Per light path.
     pub(super) light: Counts,
-    /// Merges per gathering walk, with one light path per pixel.
-    pub(super) merges: f64,
+    /// Merges per gathering walk, with as many light paths as the plan has.
+    pub(super) merges: Merges,
     branches: BranchRays,
     walks: u32,
 }
@@ -171,7 +183,9 @@ impl Findings {
         plan.inv_light_paths = 1.0 / paths as f32;
         let eye =
             gathered(pilot, (&plan, unguided.as_ref()), (&squares, dark_squares), (walks, share), &cache, &Arc::new(subpaths));
-        let (light, merges) = (shot.per_walk(), eye.merges / f64::from(walks.max(1)));
+        let per_walk = |n: f64| n / f64::from(walks.max(1));
+        let merges = Merges { clear: per_walk(eye.merges.clear), by_chance: per_walk(eye.merges.by_chance) };
+        let light = shot.per_walk();
         let mut found = Self { eye: eye.per_walk(), light, merges, branches: eye.branches, evidence: eye.evidence, walks };
         found.evidence.extend(shot.evidence);
         clip(&mut found.evidence);
@@ -238,7 +252,7 @@ fn gathered(
             let cx = Context::new(pilot.scene, plan, 0);
             let mut watch = Watch::new(Witness::with_subpaths(subpaths.clone()));
             let mut rays = RayCounts::default();
-            let (mut found, mut merges) = (vec![], 0.0);
+            let (mut found, mut merges) = (vec![], Merges::default());
             for index in job * JOB..((job + 1) * JOB).min(walks) {
                 let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 35, 0, plan.settings.seed);
                 let raster = pilot.raster(index, walks, &mut random);
@@ -253,7 +267,10 @@ fn gathered(
                         continue;
                     }
                     let merge = t.key.0 == Technique::Merge;
-                    merges += if merge { 1.0 / share } else { 0.0 };
+                    if merge {
+                        let clear = t.path.vertices[..merged(&t.path, t.key.1) - 1].iter().all(|v| is_focused(pilot.scene, v));
+                        *(if clear { &mut merges.clear } else { &mut merges.by_chance }) += 1.0 / share;
+                    }
                     let told = evidence((cx, unguided), &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
                     // A lamp's image shines on its cell alone, its reflections on dark ones around it.
                     let darker = if chain.is_some() { squares[cell as usize] / dark_squares[cell as usize] } else { 1.0 };
@@ -265,6 +282,15 @@ fn gathered(
         })
         .collect();
     found.into_iter().fold(Found::default(), Found::join)
+}
+
+/// The number of the vertex (1: the first from the eye) at which a merge joined a path to `s` vertices that shooting made.
+fn merged(path: &Path, s: usize) -> usize {
+    path.vertices.len() + 2 - s
+}
+
+fn is_focused(scene: &Scene, v: &PathVertex) -> bool {
+    v.dirac.is_some() || scene.materials.is_focused(v.surface.material)
 }
 
 /// Limits what a single path can say; chains are all found, none by luck.
@@ -282,32 +308,38 @@ fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square:
     if !(value > 0.0 && value.is_finite() && square > 0.0) {
         return None;
     }
-    let (mut shares, mut crowd) = ([0.0; Technique::ALL.len()], 0.0);
+    let (mut shares, mut by_chance, mut crowd) = ([0.0; Technique::ALL.len()], 0.0, 0.0);
     let total = |joins: &[(JoinKey, f64)]| joins.iter().map(|j| j.1).sum::<f64>();
     let densities = t.path.densities(cx);
     let found = products(&densities, cx.plan, cx.eta.into());
     let density = total(&found);
-    // Of a merge, by the number of vertices that shooting made.
     let crowd_at = |s: usize| {
-        let i = t.path.vertices.len() + 2 - s;
-        if densities.is_clear(i) { 0.0 } else { densities.crowd[i] }
+        let i = merged(&t.path, s);
+        (!densities.is_clear(i)).then_some(densities.crowd[i])
     };
     for ((technique, s), product) in &found {
         let share = if density > 0.0 { product / density } else { 0.0 };
         shares[*technique as usize] += share;
-        crowd += if *technique == Technique::Merge { share * crowd_at(*s) } else { 0.0 };
+        if *technique == Technique::Merge
+            && let Some(more) = crowd_at(*s)
+        {
+            by_chance += share;
+            crowd += share * more;
+        }
     }
-    crowd /= shares[Technique::Merge as usize].max(f64::MIN_POSITIVE);
+    crowd /= by_chance.max(f64::MIN_POSITIVE);
+    by_chance /= shares[Technique::Merge as usize].max(f64::MIN_POSITIVE);
     // What is merged at once is one find, and each part of it has but a part of the weight.
-    let at_once = if t.key.0 == Technique::Merge { 1.0 + crowd_at(t.key.1) } else { 1.0 };
+    let at_once = if t.key.0 == Technique::Merge { 1.0 + crowd_at(t.key.1).unwrap_or(0.0) } else { 1.0 };
     let unguided = unguided.map_or(1.0, |plan| {
-        let cx = Context { plan, ..cx };
+        let cx = cx.with_plan(plan);
         total(&products(&t.path.densities(cx), plan, cx.eta.into())) / density
     });
     let steady = t.path.light_delta && t.path.vertices.len() == 1;
     (shares.iter().sum::<f64>().is_finite() && unguided.is_finite()).then_some(Evidence {
         square: often * at_once * value * value / square,
         shares,
+        by_chance,
         crowd,
         unguided,
         steady,
@@ -324,6 +356,7 @@ mod tests {
         let of = |square| Evidence {
             square,
             shares: [1.0, 0.0, 0.0, 0.0, 0.0],
+            by_chance: 0.0,
             crowd: 0.0,
             unguided: 1.0,
             steady: false,

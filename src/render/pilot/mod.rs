@@ -46,6 +46,9 @@ const MOST: f64 = 50.0;
 const SCOUTS: u32 = 4096;
 /// Vertices are merged within so many times the side of a pixel.
 const MERGED_PIXELS: f32 = 2.0;
+/// A gathering walk that comes to a merge by chance finds so many light vertices, not more: by then the noise is the walk's, and each
+/// costs time.
+const FEW: f64 = 3.0;
 /// The round before which techniques are chosen.
 const CHOICE: u32 = 3;
 /// Light paths that judge techniques, at most.
@@ -67,12 +70,19 @@ pub struct Decisions {
     pub vertices_per_path: f64,
     /// Radius of merges in the first pass; 0 where there is nothing to merge.
     pub merge_radius: f32,
+    /// Merges that are met by chance have this part of the area of others.
+    pub by_chance: f32,
     /// Where many light vertices are merged at once.
     pub crowds: Arc<Crowds>,
     /// Where light paths start.
     pub guide: Guide,
     /// Where gathering walks find light, if they are to go there.
     pub incident: Option<Arc<Incident>>,
+}
+
+/// Part of its area that a merge has where a gathering walk comes by chance and would find `usual` light vertices.
+fn part_by_chance(usual: f64) -> f64 {
+    (FEW / usual).min(1.0)
 }
 
 /// Runs the pilot of a render of the crop window `crop` (x, y, width, height).
@@ -111,6 +121,7 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
             decisions.vertices_per_path = found.vertices as f64 / f64::from(paths);
         }
         if t.merge {
+            decisions.by_chance = part_by_chance(found.crowds.usual().into()) as f32;
             decisions.crowds = Arc::new(found.crowds);
         }
         if settings.guided && t.shoots() {
@@ -142,6 +153,7 @@ impl Decisions {
             settings: settings.clone(),
             vertices_per_path: 0.0,
             merge_radius: 0.0,
+            by_chance: 1.0,
             crowds: Arc::default(),
             guide: Guide::default(),
             incident: None,
@@ -157,6 +169,7 @@ impl Decisions {
         Plan {
             guide: self.guide.clone(),
             incident,
+            by_chance: self.by_chance,
             crowds: self.crowds.clone(),
             ..Plan::new(&settings, pixels, film, self.vertices_per_path)
         }
@@ -170,6 +183,7 @@ impl Decisions {
         bytes.extend(self.settings.light_paths.unwrap_or(0).to_le_bytes());
         bytes.extend(self.vertices_per_path.to_bits().to_le_bytes());
         bytes.extend(self.merge_radius.to_bits().to_le_bytes());
+        bytes.extend(self.by_chance.to_bits().to_le_bytes());
         bytes.extend(self.settings.faint.to_bits().to_le_bytes());
         bytes.extend(self.settings.chain_samples.to_le_bytes());
         bytes.push(u8::from(self.settings.guided_gathering));
@@ -454,7 +468,7 @@ impl<'a> Pilot<'a> {
         let squares = self.squares();
         let relative = |s: &Seen| f64::from(s.value) / squares[s.cell as usize].max(f64::MIN_POSITIVE).sqrt();
         let incident = trail.lessons(seen.iter().flat_map(|s| s.steps.map(|step| (step, relative(s)))));
-        let usual = met[1] as f64 / (met[0].max(1) as f64 * share);
+        let usual = met[1] as f64 / (met[0].max(1) as f64 * share * f64::from(plan.by_chance));
         let crowds = Crowds::new(merging.into_iter(), plan.merge_radius, share as f32).with_usual(usual as f32);
         Round { vertices: u64::from(cache.len()), crowds, starts: self.lessons(&squares, &seen, &starts), incident }
     }
