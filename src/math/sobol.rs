@@ -35,7 +35,7 @@ const POLYNOMIALS: [(u32, &[u32]); 4 * FOURS as usize - 1] = [
 type Tables = [[[[u32; 4]; 16]; 8]; FOURS as usize];
 
 static TABLES: LazyLock<Tables> = LazyLock::new(|| {
-    let vectors: Vec<[u32; 32]> = (0..4 * FOURS as usize).map(direction_vectors).collect();
+    let vectors: [[u32; 32]; 4 * FOURS as usize] = std::array::from_fn(direction_vectors);
     let entry = |four: usize, place: usize, bits: usize| {
         [0, 1, 2, 3].map(|axis| {
             let set = (0..4).filter(|b| bits >> b & 1 == 1);

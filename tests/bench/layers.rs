@@ -16,7 +16,7 @@ fn scene() -> Scene {
     nephroid::load_str(&text, Path::new("."), &Default::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
-const PASSES: u64 = 64;
+const PASSES: u64 = 256;
 
 fn picture(scene: &Scene, options: &Options) -> Picture {
     let mut render = Render::new(scene, options).unwrap();

@@ -78,12 +78,12 @@ fn page(room: &Room) -> String {
 #[test]
 fn a_bench_leaves_figures_a_page_and_a_reference() {
     let room = Room::new();
-    let arguments = ["--spp", "4,16", "--runs", "3", "--reference-error", "0.05", "--reference-time", "20s"];
+    let arguments = ["--spp", "4,1024", "--runs", "3", "--reference-error", "0.05", "--reference-time", "20s"];
     let (code, err) = room.bench(&arguments);
     assert_eq!(code, 0, "{err}");
     let report = room.report();
     let scene = &report["scenes"][0];
-    assert_eq!(report["marks"], serde_json::json!(["4 spp", "16 spp"]));
+    assert_eq!(report["marks"], serde_json::json!(["4 spp", "1024 spp"]));
     assert!(scene["reference"]["error"].as_f64().unwrap() <= 0.05, "{}", scene["reference"]);
     let contenders = scene["contenders"].as_array().unwrap();
     assert_eq!(contenders.iter().map(|c| c["name"].as_str().unwrap()).collect::<Vec<_>>(), ["gather", "shoot", "bidirectional"]);
@@ -94,7 +94,7 @@ fn a_bench_leaves_figures_a_page_and_a_reference() {
         assert_eq!(seeds.len(), 3);
         for r in runs {
             let samples: Vec<_> = r["curve"].as_array().unwrap().iter().map(|p| p["samples"].as_u64().unwrap()).collect();
-            assert_eq!(samples, [1, 2, 4, 8, 16]);
+            assert_eq!(samples, (2..=10).map(|i| 1 << i).collect::<Vec<u64>>());
             let rays = |k: &str| r["rays"][k].as_u64().unwrap();
             assert_eq!((rays("gather") > 0, rays("shoot") > 0), (c["name"] != "shoot", c["name"] != "gather"));
         }
@@ -103,7 +103,7 @@ fn a_bench_leaves_figures_a_page_and_a_reference() {
     let energy = |i: usize| contenders[i]["summary"]["energy"]["value"].as_f64().unwrap();
     assert!((0.96..0.985).contains(&energy(1)) && (energy(2) - 1.0).abs() < 0.05, "{} {}", energy(1), energy(2));
     let verdict = scene["verdict"].to_string();
-    assert!(verdict.contains("shoot misses") && verdict.contains("16 spp"), "{verdict}");
+    assert!(verdict.contains("shoot misses") && verdict.contains("1024 spp"), "{verdict}");
     for r in scene["ratios"].as_array().unwrap() {
         let bounds = &r["ratio"]["bounds"];
         assert!(r["ratio"].is_null() != bounds.is_array(), "a ratio has bounds: {r}");
@@ -111,7 +111,7 @@ fn a_bench_leaves_figures_a_page_and_a_reference() {
     // The more of the coupling is followed, the less is missing.
     let missing: Vec<f64> = (0..3).map(|k| scene["cost"][k]["missing"]["value"].as_f64().unwrap()).collect();
     assert!(missing[0] > missing[1] && missing[1] > missing[2] + 0.002, "{missing:?}");
-    assert_eq!(std::fs::read_to_string(room.path("out/report.csv")).unwrap().lines().count(), 1 + 3 * 3 * 5);
+    assert_eq!(std::fs::read_to_string(room.path("out/report.csv")).unwrap().lines().count(), 1 + 3 * 3 * 9);
     assert!(page(&room).contains("class=\"pixels\""));
     // The reference is used again, and stays what it is.
     let references = room.references();

@@ -116,7 +116,7 @@ fn mitsuba_means_the_same_scene() {
         assert!((light(theirs) / light(ours) - 1.0).abs() < 0.02, "{} {}", light(ours), light(theirs));
         assert_eq!(contender(&report, theirs)["runs"].as_array().map(Vec::len), Some(4));
     }
-    // The same walk has about the same error per sample.
+    // The same walk has about the same error per sample, or less where its decisions are evenly spread.
     let error = |k: usize| contender(&report, k)["summary"]["errors"][1]["relmse_trimmed"]["value"].as_f64().unwrap();
-    assert!((error(2) / error(0)).ln().abs() < 0.5, "{} {}", error(0), error(2));
+    assert!((0.6..3.0).contains(&(error(2) / error(0))), "{} {}", error(0), error(2));
 }

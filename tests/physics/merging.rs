@@ -79,3 +79,26 @@ fn a_caustic_that_is_met_by_chance_is_left_to_joins_that_see_it() {
     println!("variance with merges over that without: {:.3}", with / without);
     assert!(with < 1.6 * without, "{with} with merges, {without} without");
 }
+
+#[test]
+fn merges_that_are_met_by_chance_find_in_a_smaller_radius_what_splats_find() {
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), "glass and mirror"));
+    let of = |techniques, add| Settings {
+        light_paths: Some(if techniques == "merge" { 30_000 } else { 3000 }),
+        ..settings(techniques, "E D D S+ L", 0.04, add)
+    };
+    let mut options = Options::default();
+    options.settings = of("merge", 5);
+    let part = Render::new(&world, &options).unwrap().plan().by_chance;
+    assert!(part < 0.5, "the radius is smaller: {part} of the area");
+    let effort = Effort { renders: 40, passes: 4, max_length: 5 };
+    let [merged, seen] = [("merge", 5), ("splat", 6)].map(|(techniques, add)| series(&world, &of(techniques, add), effort));
+    let mut energy = 0.0;
+    for k in 4..=effort.max_length as usize {
+        let v = agreement(&merged[k], &seen[k]);
+        energy += v.totals.0;
+        assert!(v.p > 1e-5, "length {k}: merges {:.4e}, splats {:.4e}, p = {:.1e}", v.totals.0, v.totals.1, v.p);
+    }
+    assert!(energy > 0.0);
+}

@@ -55,7 +55,7 @@ fn coverage_is_what_renders_show() {
                 options.settings.paths = PathFilter::parse(row.paths).unwrap();
                 options.settings.max_length = 6;
                 let mut render = Render::new(&world, &options).unwrap();
-                render.run(&Budget::passes(16), |_| Control::Continue);
+                render.run(&Budget::passes(64), |_| Control::Continue);
                 let energy: f32 = render.picture().mean.iter().flatten().sum();
                 match can {
                     Can::No => assert_eq!(energy, 0.0, "{name}: {techniques} makes {}", row.paths),
