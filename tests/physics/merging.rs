@@ -85,11 +85,10 @@ fn merges_that_are_met_by_chance_find_in_a_smaller_radius_what_splats_find() {
     let dir = tempfile::tempdir().unwrap();
     let world = scene(&scenes::named(dir.path(), "glass and mirror"));
     let of = |techniques, add| Settings {
-        light_paths: Some(if techniques == "merge" { 30_000 } else { 3000 }),
-        ..settings(techniques, "E D D S+ L", 0.04, add)
+        light_paths: Some(if techniques == "merge" { 60_000 } else { 3000 }),
+        ..settings(techniques, "E D D S+ L", 0.12, add)
     };
-    let mut options = Options::default();
-    options.settings = of("merge", 5);
+    let options = Options { settings: of("merge", 5), ..Options::default() };
     let part = Render::new(&world, &options).unwrap().plan().by_chance;
     assert!(part < 0.5, "the radius is smaller: {part} of the area");
     let effort = Effort { renders: 40, passes: 4, max_length: 5 };
