@@ -39,6 +39,13 @@ pub struct PathVertex {
     pub dirac: Option<DiracEvent>,
 }
 
+impl PathVertex {
+    /// It scattered by a Dirac event, or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
+    pub fn is_focused(&self, scene: &Scene) -> bool {
+        self.dirac.is_some() || scene.materials.is_focused(self.surface.material)
+    }
+}
+
 /// A whole path, eye to light.
 #[derive(Clone, Debug)]
 pub struct Path {
@@ -109,7 +116,7 @@ impl Path {
             };
             d.delta[i + 1] = v.dirac.is_some();
             d.crowd[i + 1] = f64::from(cx.crowd(p));
-            d.focused[i + 1] = v.dirac.is_some() || scene.materials.is_focused(v.surface.material);
+            d.focused[i + 1] = v.is_focused(scene);
             if i + 1 < m {
                 d.g[i + 2] = p_gather * jacobian(p, &self.vertices[i + 1].surface);
             } else if !self.light_delta {

@@ -4,10 +4,10 @@ use super::branching::{BranchRays, Branching};
 use super::{Cell, JOB, Pilot};
 use crate::math::random::Family;
 use crate::math::{Random, limit};
-use crate::scene::{Scene, Surface};
+use crate::scene::Surface;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
-use crate::transport::reference::{JoinKey, Path, PathVertex, Subpath, Testimony, Witness, products};
+use crate::transport::reference::{JoinKey, Path, Subpath, Testimony, Witness, products};
 use crate::transport::settings::Plan;
 use crate::transport::shoot::shoot;
 use crate::transport::vertex::Scatter;
@@ -268,7 +268,7 @@ fn gathered(
                     }
                     let merge = t.key.0 == Technique::Merge;
                     if merge {
-                        let clear = t.path.vertices[..merged(&t.path, t.key.1) - 1].iter().all(|v| is_focused(pilot.scene, v));
+                        let clear = t.path.vertices[..merged(&t.path, t.key.1) - 1].iter().all(|v| v.is_focused(pilot.scene));
                         *(if clear { &mut merges.clear } else { &mut merges.by_chance }) += 1.0 / share;
                     }
                     let told = evidence((cx, unguided), &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
@@ -287,10 +287,6 @@ fn gathered(
 /// The number of the vertex (1: the first from the eye) at which a merge joined a path to `s` vertices that shooting made.
 fn merged(path: &Path, s: usize) -> usize {
     path.vertices.len() + 2 - s
-}
-
-fn is_focused(scene: &Scene, v: &PathVertex) -> bool {
-    v.dirac.is_some() || scene.materials.is_focused(v.surface.material)
 }
 
 /// Limits what a single path can say; chains are all found, none by luck.
