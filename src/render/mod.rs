@@ -20,6 +20,7 @@ mod known;
 pub mod layers;
 mod left_out;
 mod measure;
+mod order;
 mod passes;
 mod pilot;
 mod sink;

@@ -1,5 +1,6 @@
 //! One pass after another: shoot, sort, gather.
 
+use super::order::order;
 use super::sink::{Divided, Sink, Whole};
 use super::{Partition, Render};
 use crate::film::filter::MAX_RADIUS;
@@ -133,11 +134,9 @@ fn chain_random(plan: &Plan, id: u64, sample: u64) -> Random {
 fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<Vec<Splat<S::Kept>>>) {
     let plan = &render.plan;
     let cx = Context::new(render.scene, plan, pass);
-    let jobs = plan.light_paths.div_ceil(SHOOT_JOB);
-    let shots: Vec<Shot<S::Kept>> = (0..jobs)
-        .into_par_iter()
-        .map(|job| {
-            let paths = job * SHOOT_JOB..((job + 1).saturating_mul(SHOOT_JOB)).min(plan.light_paths);
+    let shots: Vec<Shot<S::Kept>> = order(render.scene, plan, pass)
+        .par_chunks(SHOOT_JOB as usize)
+        .map(|paths| {
             let mut record = SplatRecord::<S> {
                 filter: &render.filter,
                 sharing: Sharing::new(render.film.layout(), &render.filter),
@@ -149,7 +148,7 @@ fn shoot_pass<S: Sink>(render: &mut Render<'_>, pass: u64) -> (LightCache, Vec<V
             let mut rays = RayCounts::default();
             let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut () };
             for index in paths {
-                let mut random = light_path_random(plan, index, pass);
+                let mut random = light_path_random(plan, *index, pass);
                 let cache = plan.keeps_vertices().then_some(&mut vertices);
                 shoot(cx, cache, &mut random, &mut tally);
             }

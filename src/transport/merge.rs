@@ -1,10 +1,14 @@
 //! A hash grid over points, searched for all points near another one: the photon map of merges.
 //!
 //! Cells have twice the radius as side, so a ball meets at most eight of them. Points are sorted by
-//! the hash of their cell (counting sort, in the order given within a bucket, so the order of visits
+//! the bucket of their cell (counting sort, in the order given within a bucket, so the order of visits
 //! is a function of the points alone); a bucket may hold points of several cells, which the
 //! comparison of distances tells apart, and is read once even where two of the eight cells share it.
+//!
+//! Blocks of 4 × 2 × 2 cells are hashed, their cells are buckets that follow each other: what a ball
+//! meets lies in two or three lines of memory, which are asked for together, not in eight one after another.
 
+use crate::math::prefetch;
 use glam::{IVec3, Vec3};
 
 /// Points with a number each.
@@ -22,7 +26,7 @@ impl PointGrid {
         if points.is_empty() {
             return Self::default();
         }
-        let buckets = points.len().next_power_of_two();
+        let buckets = points.len().next_power_of_two().max(16);
         let mut grid = Self { starts: vec![0; buckets + 1], points: vec![(Vec3::ZERO, 0); points.len()], inv_side: 0.5 / radius };
         for (p, _) in &points {
             let bucket = grid.bucket(grid.cell(*p));
@@ -51,7 +55,9 @@ impl PointGrid {
     #[inline]
     fn bucket(&self, cell: IVec3) -> usize {
         let mix = |h: u64, x: i32| (h ^ u64::from(x as u32)).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
-        mix(mix(mix(0, cell.x), cell.y), cell.z) as usize & (self.starts.len() - 2)
+        let block = mix(mix(mix(0, cell.x >> 2), cell.y >> 1), cell.z >> 1) as usize;
+        let local = (cell.x & 3 | (cell.y & 1) << 2 | (cell.z & 1) << 3) as usize;
+        (block << 4 | local) & (self.starts.len() - 2)
     }
 
     /// Calls `visit` with the number of every point whose squared distance from `p` is below `radius2`.
@@ -66,6 +72,8 @@ impl PointGrid {
             let i = i as i32;
             *bucket = self.bucket(half.wrapping_add(IVec3::new(i & 1, (i >> 1) & 1, i >> 2)));
         }
+        buckets.iter().for_each(|b| prefetch(&raw const self.starts[*b]));
+        buckets.iter().for_each(|b| prefetch(self.points.as_ptr().wrapping_add(self.starts[*b] as usize)));
         for (i, bucket) in buckets.iter().enumerate() {
             if buckets[..i].contains(bucket) {
                 continue;

@@ -17,9 +17,28 @@ use crate::scene::emitter::Emission;
 use crate::scene::geometry::{Ray, offset_origin};
 use crate::scene::sensor::SensorConnection;
 use crate::spectrum::Spectrum;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 const EQUATION: Equation = Equation::Potential;
+
+/// What decides where a light path starts; the first axes of its random numbers.
+#[derive(Clone, Copy, Debug)]
+pub struct Draws {
+    /// Direction from the light.
+    pub direction: Vec2,
+    /// Place on it, or across the direction.
+    pub position: Vec2,
+    /// Which light.
+    pub pick: f32,
+}
+
+impl Draws {
+    /// The next of a light path that begins. Direction and position are the four axes that are most evenly filled.
+    #[inline]
+    pub fn of(random: &mut Random) -> Self {
+        Self { direction: random.axis2(), position: random.axis2(), pick: random.axis() }
+    }
+}
 
 /// One light path; its vertices are appended to `cache` where connections or merges want them.
 pub fn shoot<R: Record, O: Observe>(
@@ -32,9 +51,8 @@ pub fn shoot<R: Record, O: Observe>(
     if plan.settings.techniques.splat && plan.wants_length(1) {
         lamp::splat(cx, random, tally);
     }
-    // Direction and position are the four axes that are most evenly filled.
-    let (u_direction, u_position, u_pick) = (random.axis2(), random.axis2(), random.axis());
-    let Some(start) = scene.lights.sample_emission(&scene.geometry, &plan.guide, u_pick, u_position, u_direction) else {
+    let u = Draws::of(random);
+    let Some(start) = scene.lights.sample_emission(&scene.geometry, &plan.guide, u.pick, u.position, u.direction) else {
         tally.rays.shoot_walks += 1;
         return;
     };
