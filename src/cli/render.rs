@@ -401,7 +401,7 @@ impl Job<'_> {
             "survival": set.survival,
             "faintest_split": set.faintest_split,
             "faint_branches": set.faint,
-            "chain_samples": 1 + render.plan().more_chains(),
+            "chain_samples": render.plan().chain_samples(),
             "stratified": set.stratified,
             "seed": set.seed,
             "width": film.width(),

@@ -49,13 +49,13 @@ mod tests {
     use crate::transport::settings::Settings;
 
     fn scene(emitters: &str) -> Scene {
-        let text = format!("<scene version=\"3.0.0\"><shape type=\"sphere\"/>{emitters}</scene>");
+        let text = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"/>{emitters}</scene>");
         crate::load_str(&text, "".as_ref(), &Default::default()).map(|l| l.scene).unwrap_or_else(|e| panic!("{e}"))
     }
 
     #[test]
     fn all_paths_and_each_close_to_the_one_before() {
-        let lamp = "<emitter type=\"point\"><point name=\"position\" x=\"3\"/></emitter>";
+        let lamp = "<emitter type=\"point\"><point name=\"position\" value=\"3, 0, 0\"/></emitter>";
         let sun = "<emitter type=\"directional\"/>";
         let settings = Settings { light_paths: Some(20_000), ..Settings::default() };
         let plan = Plan::new(&settings, 100, 100, 3.0);

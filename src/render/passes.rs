@@ -193,6 +193,23 @@ impl Gathering<'_> {
         (corner + 0.5 + offset, weight)
     }
 
+    /// Samples of chains alone of a pixel of the crop window, and the part that each counts. Where pixels do not share walks
+    /// ([`Self::sample`] with taps), the walk is one more.
+    #[inline]
+    fn chains(&self, (x, y): (u32, u32), shared: bool) -> (u32, f32) {
+        let all = self.plan.chain_samples();
+        if all == 1 {
+            return (0, 1.0);
+        }
+        let samples = if self.plan.first_seen.at(x, y) { all } else { 1 };
+        (if shared { samples } else { samples - 1 }, 1.0 / samples as f32)
+    }
+
+    /// Part that a walk counts of chains where pixels share walks, and have different numbers of samples: none, if they have.
+    fn shared_part(&self) -> f32 {
+        if self.plan.chain_samples() == 1 { 1.0 } else { 0.0 }
+    }
+
     /// One sample of a pixel of the crop window: where `taps` say, or by the filter.
     #[inline]
     fn sample(
@@ -224,10 +241,11 @@ impl Gathering<'_> {
         &self,
         cx: Context<'_>,
         (pixel, pass): ((i32, i32), u64),
+        more: u32,
         rays: &mut RayCounts,
         found: impl FnMut(&Contribution),
     ) {
-        let more = u64::from(self.plan.more_chains());
+        let more = u64::from(more);
         let (corner, id) = self.pixel(pixel);
         let mut tally = Tally { record: &mut PixelRecord(found), rays, observe: &mut () };
         for i in 0..more {
@@ -247,10 +265,12 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
     let layout = render.film.layout();
     let sharing = Sharing::new(layout, filter);
     let partitions: Vec<Partition> = render.layers.iter().map(|l| l.partition.clone()).collect();
-    let context = |pass| Context::new(scene, plan, pass).with_chain_samples(1 + plan.more_chains());
+    let context = |pass| Context::new(scene, plan, pass);
     // Where pixels share walks, those of a pass come first.
-    let shared: Vec<Option<Shared<S>>> =
-        range.clone().map(|pass| share(&gathering, context(pass), sharing, exponent, pass)).collect();
+    let shared: Vec<Option<Shared<S>>> = range
+        .clone()
+        .map(|pass| share(&gathering, context(pass).with_chain_part(gathering.shared_part()), sharing, exponent, pass))
+        .collect();
     let rays = S::tiles(&mut render.film, &mut render.layers)
         .into_par_iter()
         .enumerate()
@@ -270,10 +290,12 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
                     for (x, y, local) in rect.pixels() {
                         let pixel = (x as i32, y as i32);
                         let mut found = |c: &Contribution| sink.add(local, &S::keep(c));
+                        let (more, part) = gathering.chains((x, y), shared.is_some());
+                        let cx = cx.with_chain_part(part);
                         if shared.is_none() {
                             gathering.sample(cx, (pixel, pass), None, &mut rays, &mut found);
                         }
-                        gathering.more_chains(cx, (pixel, pass), &mut rays, &mut found);
+                        gathering.more_chains(cx, (pixel, pass), more, &mut rays, &mut found);
                     }
                 }
                 sink.commit(&mut tiles);

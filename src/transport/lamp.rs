@@ -36,7 +36,7 @@ pub(super) fn is_splatted(cx: Context<'_>, lens: Vec3, point: &EmitterPoint, w: 
 /// Of one path: `nu` its density by a next event from the lens, `g` by a hit.
 #[inline]
 fn splats_more(cx: Context<'_>, nu: f32, g: f32) -> bool {
-    cx.plan.n * nu > (1 + cx.plan.more_chains()) as f32 * g
+    cx.plan.n * nu > cx.plan.chain_samples() as f32 * g
 }
 
 /// The lens sees a light point.

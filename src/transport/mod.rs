@@ -27,6 +27,7 @@ pub mod cache;
 pub mod chain;
 pub mod class;
 pub mod crowd;
+pub mod first_seen;
 pub mod gather;
 pub mod incident;
 mod lamp;

@@ -3,6 +3,7 @@
 use super::Technique;
 use super::class::PathFilter;
 use super::crowd::Crowds;
+use super::first_seen::FirstSeen;
 use super::incident::Incident;
 use super::mis::Heuristic;
 use super::mutant::{Mutant, planted};
@@ -142,7 +143,8 @@ pub struct Settings {
     /// share of the pixel are followed with a probability only; [`NO_BRANCHES`]: a walk takes one way at random.
     pub faint: f32,
     /// Samples of chains of Dirac events between eye and light (E S* L) per pixel and pass, where branches are followed:
-    /// nothing but a hit finds them, so a reflection of a lamp that is smaller than a pixel needs many.
+    /// nothing but a hit finds them, so a reflection of a lamp that is smaller than a pixel needs many. Of pixels that show no
+    /// lamp, glass or mirror first, one.
     pub chain_samples: u32,
     /// Where branches are followed and a gathering walk that came by Dirac events alone has two ways on, it takes both if the
     /// fainter carries at least this share of the pixel ([`super::split`]); [`NO_SPLITS`]: one at random.
@@ -224,6 +226,8 @@ pub struct Plan {
     pub splat_direct: bool,
     /// Factor on splats from normalisation, 1/N.
     pub inv_light_paths: f32,
+    /// Which pixels have more than one sample of chains.
+    pub first_seen: Arc<FirstSeen>,
     /// Learned densities of emission.
     pub guide: Guide,
     /// Learned densities of gathering.
@@ -256,6 +260,7 @@ impl Plan {
             merge_radius: if t.merge { settings.merge_radius.unwrap_or(0.0) } else { 0.0 },
             by_chance: 1.0,
             crowds: Arc::default(),
+            first_seen: Arc::default(),
             two_sided: light_paths > 0 && t.gathers(),
             shares_lamps: t.splat && t.hit,
             splat_direct: t.splat && !t.next_event,
@@ -278,10 +283,10 @@ impl Plan {
         self.merge_radius * ((pass + 1) as f32).powf(-1.0 / 6.0)
     }
 
-    /// Samples of chains alone beside each gathering walk.
-    pub fn more_chains(&self) -> u32 {
+    /// Samples of chains per pixel that needs more than one.
+    pub fn chain_samples(&self) -> u32 {
         let s = &self.settings;
-        if s.follows_chains() { s.chain_samples.saturating_sub(1) } else { 0 }
+        if s.follows_chains() { s.chain_samples.max(1) } else { 1 }
     }
 
     /// Shooting walks leave vertices for gathering walks.

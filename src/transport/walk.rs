@@ -33,7 +33,7 @@ pub struct Context<'a> {
     /// Light vertices in the radius of this pass where merges are met by chance, for one in the largest of the first.
     crowded: f32,
     /// Part of what comes along chains of Dirac events (E S* L) that a sample counts: where several samples of chains
-    /// belong to one gathering walk ([`super::chain::sample`]), one by their number.
+    /// belong to one gathering walk ([`super::chain::sample`]), one by their number, or 0 where they count all.
     pub chain_part: f32,
 }
 
@@ -77,9 +77,10 @@ impl<'a> Context<'a> {
         self.eta.count(clear, crowd)
     }
 
-    /// The same where a pixel has so many samples of chains.
-    pub fn with_chain_samples(self, samples: u32) -> Self {
-        Self { chain_part: if planted(Mutant::ChainPart) { 1.0 } else { 1.0 / samples as f32 }, ..self }
+    /// The same where a sample counts this part of what comes along chains.
+    #[inline]
+    pub fn with_chain_part(self, part: f32) -> Self {
+        Self { chain_part: if planted(Mutant::ChainPart) { 1.0 } else { part }, ..self }
     }
 }
 

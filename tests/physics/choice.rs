@@ -73,14 +73,14 @@ fn fainter_branches_are_followed_where_a_lamp_is_bright() {
     let mut options = automatic(&world, seed());
     options.settings.faint = NO_BRANCHES;
     let plan = Render::new(&world, &options).unwrap().plan().clone();
-    assert_eq!((plan.settings.faint, plan.more_chains()), (NO_BRANCHES, 0));
+    assert_eq!((plan.settings.faint, plan.chain_samples()), (NO_BRANCHES, 1));
 }
 
 #[test]
 fn chains_have_more_samples_where_images_of_a_lamp_are_small() {
-    assert!(chosen(chains::GLOBE).more_chains() > 0);
+    assert!(chosen(chains::GLOBE).chain_samples() > 1);
     let away = room(BULB).replace(r#"target="0, 0.6, 0""#, r#"target="0, 0.6, 2""#);
-    assert_eq!(chosen(&away).more_chains(), 0);
+    assert_eq!(chosen(&away).chain_samples(), 1);
 }
 
 /// Each render has its own pilot, choice and guide; merges, which are biased, are not among the joins.

@@ -1,10 +1,11 @@
 //! How many samples of chains (E S* L) a pixel should have: what they vary within pixels against the rays they take.
 
+use super::Pilot;
 use super::branching::Branching;
-use super::{JOB, Pilot};
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::transport::chain;
+use crate::transport::first_seen::FirstSeen;
 use crate::transport::settings::Plan;
 use crate::transport::walk::{Context, Tally};
 use crate::transport::{Contribution, RayCounts, Record};
@@ -14,15 +15,22 @@ use rayon::prelude::*;
 /// Numbers of samples that are considered.
 pub(super) const SAMPLES: [u32; 6] = [1, 2, 4, 8, 16, 32];
 /// Pixels looked at, at most.
-const PIXELS: u32 = 4096;
+const PIXELS: usize = 4096;
 /// Samples of each.
 const LOOKS: u32 = 16;
+/// Pixels whose radiance is then looked for, at most, among those where samples differ,
+const BRIGHT: usize = 512;
+/// and samples of each. An image of a lamp behind several balls of glass is met once in thousands of samples, so what one
+/// lucky sample says of a pixel must not be compared with itself.
+const LONGER_LOOKS: u32 = 128;
 
 /// What one sample of chains per pixel leaves of noise in a pass, and its rays.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ChainNoise {
     noise: f64,
-    /// Per sample, beyond the one from the eye.
+    /// Part of the pixels that need more than one sample.
+    part: f64,
+    /// Per sample of these, beyond the one from the eye.
     branches: f64,
 }
 
@@ -37,44 +45,40 @@ impl Record for Sum {
 }
 
 impl ChainNoise {
-    /// Looks at evenly spread pixels; nothing where `plan` does not follow chains.
-    pub(super) fn measured(pilot: &Pilot<'_>, plan: &Plan, dark_squares: &[f64]) -> Self {
-        let s = &plan.settings;
-        if !s.follows_chains() {
+    /// Looks at pixels of `first_seen`, evenly spread; nothing where `plan` does not follow chains.
+    pub(super) fn measured(pilot: &Pilot<'_>, plan: &Plan, first_seen: &FirstSeen, dark_squares: &[f64]) -> Self {
+        if !plan.settings.follows_chains() {
             return Self::default();
         }
-        let cx = Context::new(pilot.scene, plan, 0);
-        let all = pilot.crop[2].saturating_mul(pilot.crop[3]);
-        let looked = all.min(PIXELS);
-        let jobs = (0..looked.div_ceil(JOB)).into_par_iter().map(|job| {
-            let (mut noise, mut rays) = (0.0, RayCounts::default());
-            for index in job * JOB..((job + 1) * JOB).min(looked) {
-                let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 36, 0, s.seed);
-                let pixel = pilot.raster(index, looked, &mut random).floor();
-                let Some(cell) = pilot.cell(pixel) else { continue };
-                let (mut sum, mut squares) = (0.0, 0.0);
-                for _ in 0..LOOKS {
-                    let mut found = Sum::default();
-                    let raster = pixel + random.unit2();
-                    let mut tally = Tally { record: &mut found, rays: &mut rays, observe: &mut () };
-                    chain::sample(cx, raster, 1.0, &mut random, &mut tally);
-                    sum += found.0;
-                    squares += found.0 * found.0;
-                }
-                let n = f64::from(LOOKS);
-                let mean = sum / n;
-                let variance = (squares - sum * mean).max(0.0) / (n - 1.0);
-                let relative = variance / (mean * mean + dark_squares[cell as usize]);
-                noise += if relative.is_finite() { relative } else { 0.0 };
-            }
-            (noise, rays.gather)
-        });
-        // In the order of the jobs, so that sums do not depend on threads.
-        let found = jobs.collect::<Vec<_>>().into_iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-        let samples = f64::from(looked) * f64::from(LOOKS);
+        let mut rays = 0;
+        let mut look = |pixels: &[Vec2], looks: u32, first: u64| {
+            let (found, more) = looked(pilot, plan, pixels, (looks, first));
+            rays += more;
+            found
+        };
+        let all = first_seen.pixels().count();
+        let pixels: Vec<Vec2> = first_seen.pixels().step_by(all.div_ceil(PIXELS).max(1)).collect();
+        let differ: Vec<(Vec2, f64)> = look(&pixels, LOOKS, 0)
+            .into_iter()
+            .zip(&pixels)
+            .filter_map(|((_, variance), pixel)| (variance > 0.0).then_some((*pixel, variance)))
+            .collect();
+        let few: Vec<(Vec2, f64)> = differ.iter().step_by(differ.len().div_ceil(BRIGHT).max(1)).copied().collect();
+        let bright = look(&few.iter().map(|(pixel, _)| *pixel).collect::<Vec<_>>(), LONGER_LOOKS, 1 << 32);
+        let noise: f64 = few
+            .iter()
+            .zip(&bright)
+            .filter_map(|((pixel, variance), (mean, _))| {
+                let relative = variance / (mean * mean + dark_squares[pilot.cell(*pixel)? as usize]);
+                relative.is_finite().then_some(relative)
+            })
+            .sum();
+        let samples = pixels.len() as f64 * f64::from(LOOKS) + few.len() as f64 * f64::from(LONGER_LOOKS);
+        let times = |all: usize, some: usize| all as f64 / some.max(1) as f64;
         Self {
-            noise: found.0 * f64::from(all) / f64::from(looked.max(1)),
-            branches: (found.1 as f64 / samples.max(1.0) - 1.0).max(0.0),
+            noise: noise * times(differ.len(), few.len()) * times(all, pixels.len()),
+            part: all as f64 / f64::from(pilot.pixels().max(1)),
+            branches: (rays as f64 / samples.max(1.0) - 1.0).max(0.0),
         }
     }
 
@@ -85,6 +89,27 @@ impl ChainNoise {
 
     /// Cost of the samples beyond the walk's own: `eye` for each ray from the eye, `branch` for each branch.
     pub(super) fn cost(&self, samples: u32, eye: f64, branch: f64) -> f64 {
-        f64::from(samples - 1) * (eye + branch * self.branches)
+        f64::from(samples - 1) * self.part * (eye + branch * self.branches)
     }
+}
+
+/// Mean and variance of what samples of chains of these pixels find, and the rays that they take; `first` numbers the first pixel.
+fn looked(pilot: &Pilot<'_>, plan: &Plan, pixels: &[Vec2], (looks, first): (u32, u64)) -> (Vec<(f64, f64)>, u64) {
+    let cx = Context::new(pilot.scene, plan, 0);
+    let look = |(i, &pixel): (usize, &Vec2)| {
+        let mut random = Random::new(Family::Pilot, (first + i as u64) | 1 << 36, 0, plan.settings.seed);
+        let (mut sum, mut squares, mut rays) = (0.0, 0.0, RayCounts::default());
+        for _ in 0..looks {
+            let mut found = Sum::default();
+            let raster = pixel + random.unit2();
+            let mut tally = Tally { record: &mut found, rays: &mut rays, observe: &mut () };
+            chain::sample(cx, raster, 1.0, &mut random, &mut tally);
+            sum += found.0;
+            squares += found.0 * found.0;
+        }
+        let n = f64::from(looks);
+        ((sum / n, (squares - sum * sum / n).max(0.0) / (n - 1.0)), rays.gather)
+    };
+    let (found, rays): (Vec<_>, Vec<u64>) = pixels.par_iter().enumerate().map(look).unzip();
+    (found, rays.iter().sum())
 }

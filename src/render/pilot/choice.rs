@@ -21,8 +21,10 @@ use super::chains::{ChainNoise, SAMPLES};
 use super::evidence::{Evidence, Findings};
 use super::{Decisions, Pilot, part_by_chance};
 use crate::transport::Technique;
+use crate::transport::first_seen::FirstSeen;
 use crate::transport::mis::Heuristic;
 use crate::transport::settings::{Plan, Settings, Techniques};
+use std::sync::Arc;
 
 /// Light paths per pixel that are considered.
 const LIGHT_PATHS: [f64; 6] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0];
@@ -208,16 +210,17 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
     noise(false) * (cost + more) * GUIDE_MUST_WIN < noise(true) * cost
 }
 
-/// The settings of the best candidate, judged on `paths` light paths and as large a part of the pixels.
-pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Settings {
+/// The settings of the best candidate, judged on `paths` light paths and as large a part of the pixels; and what pixels see first.
+pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> (Settings, Arc<FirstSeen>) {
     let mut plan = pilot.plan(decisions);
     plan.settings.heuristic = Heuristic::Balance;
+    let dark_squares = pilot.dark_squares();
+    let mixture = Mixture::of(&plan, pilot.pixels());
+    let first_seen = FirstSeen::looked_at(pilot.scene, pilot.crop, pilot.settings.seed);
+    let chains = ChainNoise::measured(pilot, &plan, &first_seen, &dark_squares);
     if pilot.settings.follows_chains() {
         plan.settings.faint = LEAST;
     }
-    let dark_squares = pilot.dark_squares();
-    let mixture = Mixture::of(&plan, pilot.pixels());
-    let chains = ChainNoise::measured(pilot, &plan, &dark_squares);
     let found = Findings::collected(pilot, plan, &dark_squares, paths);
     let branchings = found.branchings(pilot.settings.faint);
     let ways: Vec<_> = branchings.iter().flat_map(|b| SAMPLES.map(|samples| (b, samples))).collect();
@@ -239,5 +242,5 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> Se
         chain_samples,
         ..c.settings(pilot.settings, pixels)
     };
-    best.map_or_else(|| pilot.settings.clone(), with)
+    (best.map_or_else(|| pilot.settings.clone(), with), Arc::new(first_seen))
 }

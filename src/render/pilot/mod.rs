@@ -22,6 +22,7 @@ use crate::scene::emitter::guide::{Guide, Start};
 use crate::scene::{Scene, Surface};
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::crowd::Crowds;
+use crate::transport::first_seen::FirstSeen;
 use crate::transport::gather::{follow, gather};
 use crate::transport::incident::{Incident, Lesson};
 use crate::transport::settings::{Coupling, NO_BRANCHES, NO_SPLITS, Plan, Settings, Techniques};
@@ -74,6 +75,8 @@ pub struct Decisions {
     pub by_chance: f32,
     /// Where many light vertices are merged at once.
     pub crowds: Arc<Crowds>,
+    /// Which pixels have more than one sample of chains.
+    pub first_seen: Arc<FirstSeen>,
     /// Where light paths start.
     pub guide: Guide,
     /// Where gathering walks find light, if they are to go there.
@@ -87,6 +90,16 @@ fn part_by_chance(usual: f64) -> f64 {
 
 /// Runs the pilot of a render of the crop window `crop` (x, y, width, height).
 pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
+    let decisions = measured(scene, settings, crop);
+    if decisions.first_seen.is_unknown() && decisions.settings.chain_samples > 1 {
+        let first_seen = Arc::new(FirstSeen::looked_at(scene, crop, settings.seed));
+        return Decisions { first_seen, ..decisions };
+    }
+    decisions
+}
+
+/// The same, without a look into every pixel where the choice of techniques had none.
+fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let t = settings.techniques;
     let connects = t.connect && settings.connections > 0;
     let nothing = Decisions::nothing(settings);
@@ -99,7 +112,7 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let mut pilot = Pilot::new(scene, settings, crop);
     // The first round only counts, since without a count there are no connections to learn from.
     let merge_radius = if t.merge { settings.merge_radius.unwrap_or_else(|| pilot.merge_radius()) } else { 0.0 };
-    let mut decisions = Decisions { merge_radius, ..nothing };
+    let mut decisions = Decisions { merge_radius, ..nothing.clone() };
     let last = (pilot.part(&pilot.plan(&decisions)) / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
     let mut learner = Guide::new(&scene.lights);
     let mut lessons = vec![];
@@ -110,10 +123,11 @@ pub fn decide(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
             paths = paths.min((pilot.part(&pilot.plan(&decisions)) / 2).max(JOB));
         }
         if round == CHOICE && settings.automatic {
-            decisions.settings = choice::choose(&pilot, &decisions, paths.min(JUDGES));
-            if !decisions.settings.techniques.shoots() {
-                decisions = Decisions::nothing(&decisions.settings);
+            let (settings, first_seen) = choice::choose(&pilot, &decisions, paths.min(JUDGES));
+            if !settings.techniques.shoots() {
+                decisions = nothing.clone();
             }
+            decisions = Decisions { settings, first_seen, ..decisions };
         }
         let found = pilot.round(&decisions, (round, paths), goes);
         let t = decisions.settings.techniques;
@@ -155,6 +169,7 @@ impl Decisions {
             merge_radius: 0.0,
             by_chance: 1.0,
             crowds: Arc::default(),
+            first_seen: Arc::default(),
             guide: Guide::default(),
             incident: None,
         }
@@ -171,6 +186,7 @@ impl Decisions {
             incident,
             by_chance: self.by_chance,
             crowds: self.crowds.clone(),
+            first_seen: self.first_seen.clone(),
             ..Plan::new(&settings, pixels, film, self.vertices_per_path)
         }
     }
