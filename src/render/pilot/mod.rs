@@ -118,9 +118,9 @@ fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let mut lessons = vec![];
     for round in 0..ROUNDS {
         let mut paths = (last >> (ROUNDS - 1 - round)).max(JOB);
-        if decisions.incident.is_some() {
-            // Where light paths are few, gathering walks are many.
-            paths = paths.min((pilot.part(&pilot.plan(&decisions)) / 2).max(JOB));
+        if round >= CHOICE {
+            // Where light paths are few, gathering walks are many: half of a pass is enough, whatever was chosen.
+            paths = paths.min((pilot.part(&pilot.plan(&decisions)) / 2) >> (ROUNDS - 1 - round)).max(JOB);
         }
         if round == CHOICE && settings.automatic {
             let (settings, first_seen) = choice::choose(&pilot, &decisions, paths.min(JUDGES));
