@@ -7,6 +7,7 @@ use crate::math::{Random, prefetch};
 use crate::scene::{EmitterId, Surface};
 use crate::spectrum::Spectrum;
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// A vertex of a shooting walk at which a gathering walk can end.
 #[derive(Clone, Debug)]
@@ -38,6 +39,72 @@ pub struct LightVertex {
 /// Two lines of a cache.
 const _: () = assert!(size_of::<LightVertex>() == 128);
 
+/// What a merge needs to know of a light vertex: one line of a cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub struct MergeVertex {
+    throughput: Spectrum,
+    /// As of the vertex.
+    pub w_back: Vec3,
+    /// As of the vertex.
+    pub partial: Partial<f32>,
+    index: u32,
+    emitter: EmitterId,
+    class: Positions,
+    length: u16,
+    first_delta: bool,
+    /// Geometric normal, in units of 1/127.
+    n_g: [i8; 3],
+}
+
+const _: () = assert!(size_of::<MergeVertex>() == 64);
+
+impl MergeVertex {
+    /// Of vertex `index` of the cache.
+    fn new(index: u32, v: &LightVertex) -> Self {
+        let &LightVertex { w_back, throughput, partial, length, class, first_delta, emitter, .. } = v;
+        let n_g = (v.surface.n_g * 127.0).round().to_array().map(|x| x as i8);
+        Self { throughput, w_back, partial, index, emitter, class, length, first_delta, n_g }
+    }
+
+    /// The light path that it ends.
+    pub fn end(&self) -> LightEnd {
+        let &Self { throughput, index, emitter, class, length, first_delta, .. } = self;
+        LightEnd { throughput, index, emitter, class, length, first_delta }
+    }
+
+    /// Cosine between its geometric normal and `n`, either way, to about a hundredth.
+    #[inline]
+    pub fn cos_to(&self, n: Vec3) -> f32 {
+        (Vec3::from_array(self.n_g.map(f32::from)).dot(n) * (1.0 / 127.0)).abs()
+    }
+}
+
+/// A light path up to a vertex of the cache, as a gathering walk goes on along it.
+#[derive(Clone, Copy, Debug)]
+pub struct LightEnd {
+    /// As of the vertex.
+    pub throughput: Spectrum,
+    /// Which vertex of the cache.
+    pub index: u32,
+    /// As of the vertex.
+    pub emitter: EmitterId,
+    /// As of the vertex.
+    pub class: Positions,
+    /// As of the vertex.
+    pub length: u16,
+    /// As of the vertex.
+    pub first_delta: bool,
+}
+
+impl LightVertex {
+    /// The light path that it ends, as vertex `index` of the cache.
+    pub fn end(&self, index: u32) -> LightEnd {
+        let &Self { throughput, emitter, class, length, first_delta, .. } = self;
+        LightEnd { throughput, index, emitter, class, length, first_delta }
+    }
+}
+
 /// All light vertices of one pass, in the order of their light paths; as many pieces as jobs made
 /// them, so that nothing is copied together.
 #[derive(Clone, Debug, Default)]
@@ -45,8 +112,10 @@ pub struct LightCache {
     pieces: Vec<Vec<LightVertex>>,
     /// Index of the first vertex of each piece; the total at the end.
     starts: Vec<u32>,
-    /// Those that merges may end at.
+    /// Places of those that merges may end at,
     grid: PointGrid,
+    /// and what merges need of them, in the order of the grid: what is found together lies together.
+    merging: Vec<MergeVertex>,
 }
 
 impl LightCache {
@@ -59,11 +128,12 @@ impl LightCache {
             total = total.saturating_add(u32::try_from(p.len()).unwrap_or(u32::MAX));
             starts.push(total);
         }
-        let mut cache = Self { pieces, starts, grid: PointGrid::default() };
+        let mut cache = Self { pieces, starts, ..Self::default() };
         if merge_radius > 0.0 {
             let all = (0..total).zip(cache.pieces.iter().flatten());
             let points = all.filter(|(_, v)| v.merges).map(|(i, v)| (v.surface.p, i)).collect();
             cache.grid = PointGrid::new(points, merge_radius);
+            cache.merging = cache.grid.numbers().map(|i| MergeVertex::new(i, cache.get(i))).collect();
         }
         cache
     }
@@ -95,26 +165,23 @@ impl LightCache {
         Some((i, vertex))
     }
 
-    /// Calls `visit` with every vertex for merges, and its index, whose squared distance from `p` is
-    /// below `radius2`, at most the square of the radius given to [`Self::new`].
+    /// Calls `visit` with every vertex for merges whose squared distance from `p` is below `radius2`, at most the square
+    /// of the radius given to [`Self::new`].
     #[inline]
-    pub fn around(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(u32, &LightVertex)) {
-        // They lie all over memory: some are asked for at a time, then looked at.
-        let mut some: [(u32, Option<&LightVertex>); 16] = [(0, None); 16];
+    pub fn around(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(&MergeVertex)) {
+        // Some are asked for at a time, then looked at.
+        let mut some: [Option<&MergeVertex>; 16] = [None; 16];
         let mut n = 0;
-        let mut look = |some: &[(u32, Option<&LightVertex>)]| {
-            some.iter().for_each(|(i, v)| v.iter().for_each(|v| visit(*i, v)));
-        };
-        self.grid.around(p, radius2, |i| {
-            let vertex = self.get(i);
+        self.grid.around(p, radius2, |at| {
+            let vertex = &self.merging[at as usize];
             prefetch(vertex);
-            some[n] = (i, Some(vertex));
+            some[n] = Some(vertex);
             n += 1;
             if n == some.len() {
-                look(&some);
+                some.iter().flatten().for_each(|v| visit(v));
                 n = 0;
             }
         });
-        look(&some[..n]);
+        some[..n].iter().flatten().for_each(|v| visit(v));
     }
 }

@@ -4,7 +4,7 @@
 //! it is the eye's half of bidirectional path tracing [Veach 1997, ch. 10].
 
 use super::branch::Branch;
-use super::cache::{LightCache, LightVertex};
+use super::cache::{LightCache, LightEnd, LightVertex};
 use super::chain;
 use super::class::{Finished, Positions, Symbol};
 use super::lamp;
@@ -423,17 +423,17 @@ fn connect<R: Record, O: Observe>(
         if !scene.geometry.visible(end(&vertex.surface), end(&y.surface)) {
             continue;
         }
-        meet(cx, walk, Technique::Connect, (index, y), length, (value, weight), tally);
+        meet(cx, walk, Technique::Connect, &y.end(index), length, (value, weight), tally);
     }
 }
 
-/// Hands on a path of two walks: the gathering one, and that of light vertex `y`, number `index` of the cache.
+/// Hands on a path of two walks: the gathering one, and that which ends at light vertex `y`.
 #[inline]
 fn meet<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,
     technique: Technique,
-    (index, y): (u32, &LightVertex),
+    y: &LightEnd,
     length: u32,
     (value, weight): (Spectrum, f32),
     tally: &mut Tally<'_, R, O>,
@@ -457,7 +457,7 @@ fn meet<R: Record, O: Observe>(
         light: None,
         emitter: y.emitter,
         light_delta,
-        light_vertex: index as usize,
+        light_vertex: y.index as usize,
         lens: Vec3::ZERO,
         value,
     };
@@ -478,9 +478,10 @@ fn merge<R: Record, O: Observe>(
     // Of η, the area of the disk and the number of light paths.
     let factor = plan.light_paths as f32 * plan.inv_light_paths / cx.eta.count(walk.clear, 0.0);
     let mut count = None;
-    lights.around(vertex.surface.p, cx.merge_radius2(walk.clear), |index, y| {
-        let length = walk.length + 1 + u32::from(y.length);
-        if !plan.wants_length(length) || y.surface.n_g.dot(vertex.surface.n_g).abs() < SAME_SURFACE {
+    lights.around(vertex.surface.p, cx.merge_radius2(walk.clear), |y| {
+        let end = y.end();
+        let length = walk.length + 1 + u32::from(end.length);
+        if !plan.wants_length(length) || y.cos_to(vertex.surface.n_g) < SAME_SURFACE {
             return;
         }
         let Some(k) = vertex.kernel(EQUATION, y.w_back) else { return };
@@ -488,10 +489,10 @@ fn merge<R: Record, O: Observe>(
         let weight = mis::merge(h, count, partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
         // Flux per area is irradiance: the kernel's cosine is already in it.
         let cos_g = if planted(Mutant::MergeCosine) { 1.0 } else { k.cos_g };
-        let value = walk.throughput * y.throughput * k.value * (factor * weight / cos_g);
+        let value = walk.throughput * end.throughput * k.value * (factor * weight / cos_g);
         if value.is_black() {
             return;
         }
-        meet(cx, walk, Technique::Merge, (index, y), length, (value, weight), tally);
+        meet(cx, walk, Technique::Merge, &end, length, (value, weight), tally);
     });
 }

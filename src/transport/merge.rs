@@ -10,6 +10,7 @@
 
 use crate::math::prefetch;
 use glam::{IVec3, Vec3};
+use rayon::prelude::*;
 
 /// Points with a number each.
 #[derive(Clone, Debug, Default)]
@@ -60,7 +61,12 @@ impl PointGrid {
         (block << 4 | local) & (self.starts.len() - 2)
     }
 
-    /// Calls `visit` with the number of every point whose squared distance from `p` is below `radius2`.
+    /// The numbers of the points in the order of the grid.
+    pub fn numbers(&self) -> impl IndexedParallelIterator<Item = u32> {
+        self.points.par_iter().map(|(_, number)| *number)
+    }
+
+    /// Calls `visit` with the place in [`Self::numbers`] of every point whose squared distance from `p` is below `radius2`.
     #[inline]
     pub fn around(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(u32)) {
         if self.points.is_empty() {
@@ -78,9 +84,11 @@ impl PointGrid {
             if buckets[..i].contains(bucket) {
                 continue;
             }
-            for (q, number) in &self.points[self.starts[*bucket] as usize..self.starts[bucket + 1] as usize] {
+            let places = self.starts[*bucket]..self.starts[bucket + 1];
+            let points = &self.points[places.start as usize..places.end as usize];
+            for (place, (q, _)) in places.zip(points) {
                 if (*q - p).length_squared() < radius2 {
-                    visit(*number);
+                    visit(place);
                 }
             }
         }
@@ -102,11 +110,12 @@ mod tests {
         let points: Vec<(Vec3, u32)> = (0..5000).map(|i| (point(), i)).collect();
         let (radius, mut found_any) = (0.7f32, 0);
         let grid = PointGrid::new(points.clone(), radius);
+        let numbers: Vec<u32> = grid.numbers().collect();
         for _ in 0..500 {
             let p = point();
             for r in [radius, 0.4] {
                 let mut found = vec![];
-                grid.around(p, r * r, |i| found.push(i));
+                grid.around(p, r * r, |i| found.push(numbers[i as usize]));
                 found.sort_unstable();
                 let all: Vec<u32> = points.iter().filter(|(q, _)| (*q - p).length_squared() < r * r).map(|(_, i)| *i).collect();
                 assert_eq!(found, all);
@@ -122,7 +131,8 @@ mod tests {
         let far = Vec3::new(1e30, -1e30, f32::NAN);
         let grid = PointGrid::new(vec![(far, 0), (Vec3::ONE, 1)], 1e-6);
         let mut found = 0;
-        grid.around(Vec3::ONE, 1e-12, |i| found += i);
+        let numbers: Vec<u32> = grid.numbers().collect();
+        grid.around(Vec3::ONE, 1e-12, |i| found += numbers[i as usize]);
         grid.around(far, 1e-12, |_| found = 100);
         assert_eq!(found, 1);
     }
