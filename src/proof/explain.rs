@@ -9,7 +9,7 @@
 use crate::film::Filter;
 use crate::math::Random;
 use crate::math::random::Family;
-use crate::render::{Measurement, Options, PixelMeasurement, Render, RenderError};
+use crate::render::{Measurement, Options, PixelMeasurement, Render, RenderError, order};
 use crate::scene::emitter::Emission;
 use crate::scene::{Scene, Surface};
 use crate::spectrum::Spectrum;
@@ -178,7 +178,7 @@ fn search(cx: Context<'_>, filter: &Filter, pixel: (u32, u32), pass: u64, found:
     watch.witness.expect_shooting(true);
     let mut tally = Tally { record: &mut record, rays: &mut rays, observe: &mut watch };
     let mut vertices: Vec<LightVertex> = Vec::new();
-    for index in 0..plan.light_paths {
+    for index in order(cx.scene, plan, pass) {
         let mut random = Random::new(Family::Shoot, u64::from(index), pass, plan.settings.seed);
         shoot(cx, plan.keeps_vertices().then_some(&mut vertices), &mut random, &mut tally);
     }

@@ -31,6 +31,7 @@ pub use known::film_of;
 pub use layers::{Layers, Partition};
 pub use left_out::left_out;
 pub use measure::{Measurement, PixelMeasurement, measure};
+pub(crate) use order::order;
 pub use passes::SHOOT_JOB;
 pub(crate) use passes::{light_path_random, pixel_random};
 pub use truncation::Truncation;

@@ -37,7 +37,7 @@ fn cell(x: f32) -> u32 {
     ((x * (1 << BITS) as f32) as u32).min((1 << BITS) - 1)
 }
 
-/// Number of a cell of the unit square along a curve that stays close [Morton 1966].
+/// Number of a cell of the unit square along a Z-order curve.
 fn interleaved(p: Vec2) -> u32 {
     let (x, y) = (cell(p.x), cell(p.y));
     (0..BITS).fold(0, |sum, b| sum | (x >> b & 1) << (2 * b) | (y >> b & 1) << (2 * b + 1))

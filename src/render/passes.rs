@@ -193,21 +193,21 @@ impl Gathering<'_> {
         (corner + 0.5 + offset, weight)
     }
 
-    /// Samples of chains alone of a pixel of the crop window, and the part that each counts. Where pixels do not share walks
-    /// ([`Self::sample`] with taps), the walk is one more.
+    /// Samples of chains alone of a pixel of the crop window, and the part that each counts. The walk counts the same part, or,
+    /// where pixels share walks, [`Self::shared_part`] in all of them: a pixel that needs one sample then has another for the rest.
     #[inline]
     fn chains(&self, (x, y): (u32, u32), shared: bool) -> (u32, f32) {
         let all = self.plan.chain_samples();
-        if all == 1 {
-            return (0, 1.0);
+        match (self.plan.first_seen.at(x, y), shared && all > 1) {
+            (true, _) => (all - 1, self.shared_part()),
+            (false, true) => (1, 1.0 - self.shared_part()),
+            (false, false) => (0, 1.0),
         }
-        let samples = if self.plan.first_seen.at(x, y) { all } else { 1 };
-        (if shared { samples } else { samples - 1 }, 1.0 / samples as f32)
     }
 
-    /// Part that a walk counts of chains where pixels share walks, and have different numbers of samples: none, if they have.
+    /// Part that a walk counts of chains where pixels share it.
     fn shared_part(&self) -> f32 {
-        if self.plan.chain_samples() == 1 { 1.0 } else { 0.0 }
+        1.0 / self.plan.chain_samples() as f32
     }
 
     /// One sample of a pixel of the crop window: where `taps` say, or by the filter.

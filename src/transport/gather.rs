@@ -76,11 +76,7 @@ pub fn follow<R: Record, O: Observe>(
         eta: 1.0,
         class: plan.settings.paths.eye(),
         first_delta: false,
-        chain: match plan.settings.follows_chains() {
-            true if cx.chain_part > 0.0 => Chain::Single,
-            true => Chain::Branched,
-            false => Chain::Ended,
-        },
+        chain: if plan.settings.follows_chains() { Chain::Single } else { Chain::Ended },
     };
     let (mut next, mut others) = (Some((walk, ray)), Others::default());
     while let Some(way) = next {

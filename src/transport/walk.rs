@@ -33,7 +33,7 @@ pub struct Context<'a> {
     /// Light vertices in the radius of this pass where merges are met by chance, for one in the largest of the first.
     crowded: f32,
     /// Part of what comes along chains of Dirac events (E S* L) that a sample counts: where several samples of chains
-    /// belong to one gathering walk ([`super::chain::sample`]), one by their number, or 0 where they count all.
+    /// belong to one gathering walk ([`super::chain::sample`]), one by their number.
     pub chain_part: f32,
 }
 

@@ -50,21 +50,17 @@ impl ChainNoise {
         if !plan.settings.follows_chains() {
             return Self::default();
         }
-        let mut rays = 0;
-        let mut look = |pixels: &[Vec2], looks: u32, first: u64| {
-            let (found, more) = looked(pilot, plan, pixels, (looks, first));
-            rays += more;
-            found
-        };
         let all = first_seen.pixels().count();
         let pixels: Vec<Vec2> = first_seen.pixels().step_by(all.div_ceil(PIXELS).max(1)).collect();
-        let differ: Vec<(Vec2, f64)> = look(&pixels, LOOKS, 0)
+        let (found, rays) = looked(pilot, plan, &pixels, (LOOKS, 0));
+        let differ: Vec<(Vec2, f64)> = found
             .into_iter()
             .zip(&pixels)
             .filter_map(|((_, variance), pixel)| (variance > 0.0).then_some((*pixel, variance)))
             .collect();
         let few: Vec<(Vec2, f64)> = differ.iter().step_by(differ.len().div_ceil(BRIGHT).max(1)).copied().collect();
-        let bright = look(&few.iter().map(|(pixel, _)| *pixel).collect::<Vec<_>>(), LONGER_LOOKS, 1 << 32);
+        let again: Vec<Vec2> = few.iter().map(|(pixel, _)| *pixel).collect();
+        let (bright, _) = looked(pilot, plan, &again, (LONGER_LOOKS, 1 << 32));
         let noise: f64 = few
             .iter()
             .zip(&bright)
@@ -73,7 +69,7 @@ impl ChainNoise {
                 relative.is_finite().then_some(relative)
             })
             .sum();
-        let samples = pixels.len() as f64 * f64::from(LOOKS) + few.len() as f64 * f64::from(LONGER_LOOKS);
+        let samples = pixels.len() as f64 * f64::from(LOOKS);
         let times = |all: usize, some: usize| all as f64 / some.max(1) as f64;
         Self {
             noise: noise * times(differ.len(), few.len()) * times(all, pixels.len()),
