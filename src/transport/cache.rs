@@ -39,52 +39,9 @@ pub struct LightVertex {
 /// Two lines of a cache.
 const _: () = assert!(size_of::<LightVertex>() == 128);
 
-/// What a merge needs to know of a light vertex: one line of a cache.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub struct MergeVertex {
-    throughput: Spectrum,
-    /// As of the vertex.
-    pub w_back: Vec3,
-    /// As of the vertex.
-    pub partial: Partial<f32>,
-    index: u32,
-    emitter: EmitterId,
-    class: Positions,
-    length: u16,
-    first_delta: bool,
-    /// Geometric normal, in units of 1/127.
-    n_g: [i8; 3],
-}
-
-const _: () = assert!(size_of::<MergeVertex>() == 64);
-
-impl MergeVertex {
-    /// Of vertex `index` of the cache.
-    fn new(index: u32, v: &LightVertex) -> Self {
-        let &LightVertex { w_back, throughput, partial, length, class, first_delta, emitter, .. } = v;
-        let n_g = (v.surface.n_g * 127.0).round().to_array().map(|x| x as i8);
-        Self { throughput, w_back, partial, index, emitter, class, length, first_delta, n_g }
-    }
-
-    /// The light path that it ends.
-    pub fn end(&self) -> LightEnd {
-        let &Self { throughput, index, emitter, class, length, first_delta, .. } = self;
-        LightEnd { throughput, index, emitter, class, length, first_delta }
-    }
-
-    /// Cosine between its geometric normal and `n`, either way, to about a hundredth.
-    #[inline]
-    pub fn cos_to(&self, n: Vec3) -> f32 {
-        (Vec3::from_array(self.n_g.map(f32::from)).dot(n) * (1.0 / 127.0)).abs()
-    }
-}
-
 /// A light path up to a vertex of the cache, as a gathering walk goes on along it.
 #[derive(Clone, Copy, Debug)]
 pub struct LightEnd {
-    /// As of the vertex.
-    pub throughput: Spectrum,
     /// Which vertex of the cache.
     pub index: u32,
     /// As of the vertex.
@@ -99,9 +56,42 @@ pub struct LightEnd {
 
 impl LightVertex {
     /// The light path that it ends, as vertex `index` of the cache.
+    #[inline]
     pub fn end(&self, index: u32) -> LightEnd {
-        let &Self { throughput, emitter, class, length, first_delta, .. } = self;
-        LightEnd { throughput, index, emitter, class, length, first_delta }
+        let &Self { emitter, class, length, first_delta, .. } = self;
+        LightEnd { index, emitter, class, length, first_delta }
+    }
+}
+
+/// What a merge needs to know of a light vertex: one line of a cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub struct MergeVertex {
+    /// As of the vertex.
+    pub throughput: Spectrum,
+    /// The light path that it ends.
+    pub end: LightEnd,
+    /// As of the vertex.
+    pub w_back: Vec3,
+    /// As of the vertex.
+    pub partial: Partial<f32>,
+    /// Geometric normal, in units of 1/127.
+    n_g: [i8; 3],
+}
+
+const _: () = assert!(size_of::<MergeVertex>() == 64);
+
+impl MergeVertex {
+    /// Of vertex `index` of the cache.
+    fn new(index: u32, v: &LightVertex) -> Self {
+        let n_g = (v.surface.n_g * 127.0).round().to_array().map(|x| x as i8);
+        Self { throughput: v.throughput, end: v.end(index), w_back: v.w_back, partial: v.partial, n_g }
+    }
+
+    /// Cosine between its geometric normal and `n`, either way, to about a hundredth.
+    #[inline]
+    pub fn cos_to(&self, n: Vec3) -> f32 {
+        (Vec3::from_array(self.n_g.map(f32::from)).dot(n) * (1.0 / 127.0)).abs()
     }
 }
 

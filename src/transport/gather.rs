@@ -475,8 +475,7 @@ fn merge<R: Record, O: Observe>(
     let factor = plan.light_paths as f32 * plan.inv_light_paths / cx.eta.count(walk.clear, 0.0);
     let mut count = None;
     lights.around(vertex.surface.p, cx.merge_radius2(walk.clear), |y| {
-        let end = y.end();
-        let length = walk.length + 1 + u32::from(end.length);
+        let length = walk.length + 1 + u32::from(y.end.length);
         if !plan.wants_length(length) || y.cos_to(vertex.surface.n_g) < SAME_SURFACE {
             return;
         }
@@ -485,10 +484,10 @@ fn merge<R: Record, O: Observe>(
         let weight = mis::merge(h, count, partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
         // Flux per area is irradiance: the kernel's cosine is already in it.
         let cos_g = if planted(Mutant::MergeCosine) { 1.0 } else { k.cos_g };
-        let value = walk.throughput * end.throughput * k.value * (factor * weight / cos_g);
+        let value = walk.throughput * y.throughput * k.value * (factor * weight / cos_g);
         if value.is_black() {
             return;
         }
-        meet(cx, walk, Technique::Merge, &end, length, (value, weight), tally);
+        meet(cx, walk, Technique::Merge, &y.end, length, (value, weight), tally);
     });
 }

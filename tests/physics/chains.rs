@@ -167,3 +167,33 @@ fn more_samples_of_chains_find_the_same_with_less_noise() {
         }
     }
 }
+
+/// A lamp that covers a fiftieth of a pixel: hardly a look into its pixel meets it, and it is seen in full all the same.
+#[test]
+fn a_lamp_that_a_look_missed_is_seen_in_full() {
+    let xml = r#"<scene version="3.0.0">
+<sensor type="orthographic"><transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/><rfilter type="FILTER"/></film></sensor>
+<shape type="sphere"><point name="center" value="0.1, 0.1, 0"/><float name="radius" value="0.02"/>
+  <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>
+</scene>"#;
+    for filter in ["box", "gaussian"] {
+        let world = scene(&xml.replace("FILTER", filter));
+        let total = |chain_samples: u32| {
+            let draw = |s: u64| {
+                let settings = Settings { chain_samples, ..settings("hit", true, 300 + s) };
+                let mut render = Render::new(&world, &Options { settings, ..Options::default() }).unwrap();
+                render.run(&Budget::passes(64), |_| Control::Continue);
+                render.picture().mean.iter().map(|p| f64::from(p[1])).sum::<f64>()
+            };
+            let draws: Vec<f64> = (0..60).map(draw).collect();
+            let n = draws.len() as f64;
+            let mean = draws.iter().sum::<f64>() / n;
+            (mean, draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)))
+        };
+        let (one, eight) = (total(1), total(8));
+        let z = (one.0 - eight.0) / (one.1 + eight.1).sqrt();
+        println!("{filter}: {one:?} by one sample, {eight:?} by eight where a look met it, z = {z:.1}");
+        assert!(one.0 > 0.0 && z.abs() < 4.0, "{filter}: {one:?}, {eight:?}");
+    }
+}

@@ -216,9 +216,11 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> (S
     plan.settings.heuristic = Heuristic::Balance;
     let dark_squares = pilot.dark_squares();
     let mixture = Mixture::of(&plan, pilot.pixels());
-    let first_seen = FirstSeen::looked_at(pilot.scene, pilot.crop, pilot.settings.seed);
+    let follows = pilot.settings.follows_chains();
+    let look = || FirstSeen::looked_at(pilot.scene, pilot.crop, pilot.settings.seed);
+    let first_seen = if follows { look() } else { FirstSeen::default() };
     let chains = ChainNoise::measured(pilot, &plan, &first_seen, &dark_squares);
-    if pilot.settings.follows_chains() {
+    if follows {
         plan.settings.faint = LEAST;
     }
     let found = Findings::collected(pilot, plan, &dark_squares, paths);
