@@ -12,8 +12,50 @@ use crate::spectrum::Spectrum;
 use crate::texture::{TextureSlot, Textures};
 use glam::Vec2;
 
-/// Roughness below which a model without a diffuse part scatters into few directions.
+/// Into how many directions a material scatters what arrives from one, by the roughness of all its events. One answer for
+/// the whole material, told in the middle of textures, so that it belongs to the path and not to the walker that asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Breadth {
+    /// Dirac events, or as good as those.
+    Sharp,
+    /// Polished metal, clear glass with a haze.
+    Focused,
+    /// Frosted glass, brushed metal: about a mirrored or a refracted direction.
+    Narrow,
+    /// Anywhere, or a diffuse part, or far more widely along one tangent than along the other.
+    Wide,
+}
+
+/// Roughness below which a model without a diffuse part has each.
+const SHARP: f32 = 0.03;
 const FOCUSED: f32 = 0.1;
+const NARROW: f32 = 0.6;
+
+impl Breadth {
+    fn of(model: &Model, textures: &Textures) -> Self {
+        if model.lobes().diffuse || model.is_anisotropic() {
+            return Self::Wide;
+        }
+        match model.resolve(textures, Vec2::splat(0.5)).roughness() {
+            r if r < SHARP => Self::Sharp,
+            r if r < FOCUSED => Self::Focused,
+            r if r < NARROW => Self::Narrow,
+            _ => Self::Wide,
+        }
+    }
+
+    /// Focused at most: what goes on is nearly what came.
+    #[inline]
+    pub fn is_focused(self) -> bool {
+        self <= Self::Focused
+    }
+
+    /// Narrow at most.
+    #[inline]
+    pub fn is_narrow(self) -> bool {
+        self <= Self::Narrow
+    }
+}
 
 /// Roughness from which a model scatters so widely that it matters less than where light comes from.
 const WIDE: f32 = 0.3;
@@ -81,7 +123,7 @@ pub(super) enum Side {
 struct Summary {
     lobes: Lobes,
     anisotropic: bool,
-    focused: bool,
+    breadth: Breadth,
     guided: bool,
     albedo_bound: Spectrum,
 }
@@ -119,7 +161,7 @@ impl Materials {
         self.summaries.push(Summary {
             lobes: models().fold(Lobes::default(), |all, m| all.union(m.lobes())),
             anisotropic: models().any(Model::is_anisotropic),
-            focused: models().all(|m| is_focused(m, textures)),
+            breadth: models().map(|m| Breadth::of(m, textures)).max().unwrap_or(Breadth::Sharp),
             guided: models().any(|m| is_wide(m, textures)) && !models().any(|m| m.lobes().glossy_refraction),
             albedo_bound: models().fold(Spectrum::BLACK, |most, m| most.lane_max(m.albedo_bound(textures))),
         });
@@ -158,15 +200,14 @@ impl Materials {
         self.summaries[id.0 as usize].anisotropic
     }
 
-    /// All its events are Dirac events or nearly so: whatever arrives leaves in few directions. One answer for the
-    /// whole material, so that it belongs to the path and not to the walker that asks.
+    /// Into how many directions it scatters at most.
     #[inline]
-    pub fn is_focused(&self, id: MaterialId) -> bool {
-        self.summaries[id.0 as usize].focused
+    pub fn breadth(&self, id: MaterialId) -> Breadth {
+        self.summaries[id.0 as usize].breadth
     }
 
     /// Scatters widely, and on the side that light comes from: gathering walks may go where light is known to come from. One
-    /// answer for the whole material, like [`Self::is_focused`].
+    /// answer for the whole material, like [`Self::breadth`].
     #[inline]
     pub fn is_guided(&self, id: MaterialId) -> bool {
         self.summaries[id.0 as usize].guided
@@ -192,12 +233,6 @@ impl Materials {
     pub fn albedo_bound(&self, id: MaterialId) -> Spectrum {
         self.summaries[id.0 as usize].albedo_bound
     }
-}
-
-/// Told in the middle of textures.
-fn is_focused(model: &Model, textures: &Textures) -> bool {
-    let spread = model.lobes().diffuse || model.is_anisotropic();
-    !spread && model.resolve(textures, Vec2::splat(0.5)).roughness() < FOCUSED
 }
 
 /// Told in the middle of textures.

@@ -32,7 +32,7 @@ pub mod thin_dielectric;
 pub mod two_sided;
 
 pub use closure::{Closure, MODEL_SOURCES};
-pub use material::{Lobes, MaterialId, Materials};
+pub use material::{Breadth, Lobes, MaterialId, Materials};
 
 use crate::spectrum::Spectrum;
 use crate::texture::Textures;

@@ -32,8 +32,8 @@ pub struct LightVertex {
     pub first_delta: bool,
     /// Where the light comes from.
     pub emitter: EmitterId,
-    /// Reached by a focused event from the light, and none itself: merges may end here.
-    pub merges: bool,
+    /// Reached by a narrow event from the light, and not sharp itself: merges may end here. Whether its events are focused.
+    pub merges: Option<bool>,
 }
 
 /// Two lines of a cache.
@@ -68,13 +68,15 @@ impl LightVertex {
 #[repr(align(64))]
 pub struct MergeVertex {
     /// As of the vertex.
-    pub throughput: Spectrum,
+    throughput: Vec3,
+    /// What `b` of [`Self::partial`] is more by where all events between it and the eye are focused.
+    merged: f32,
     /// The light path that it ends.
     pub end: LightEnd,
     /// As of the vertex.
     pub w_back: Vec3,
     /// As of the vertex.
-    pub partial: Partial<f32>,
+    partial: Partial<f32>,
     /// Geometric normal, in units of 1/127.
     n_g: [i8; 3],
 }
@@ -85,7 +87,21 @@ impl MergeVertex {
     /// Of vertex `index` of the cache.
     fn new(index: u32, v: &LightVertex) -> Self {
         let n_g = (v.surface.n_g * 127.0).round().to_array().map(|x| x as i8);
-        Self { throughput: v.throughput, end: v.end(index), w_back: v.w_back, partial: v.partial, n_g }
+        let merged = if v.merges == Some(true) { v.by_material } else { 0.0 };
+        Self { throughput: v.throughput.to_rgb().into(), merged, end: v.end(index), w_back: v.w_back, partial: v.partial, n_g }
+    }
+
+    /// As of the vertex.
+    #[inline]
+    pub fn throughput(&self) -> Spectrum {
+        let Vec3 { x, y, z } = self.throughput;
+        Spectrum::rgb(x, y, z)
+    }
+
+    /// MIS sum on arrival, where all events between it and the eye are focused (`clear`) or not.
+    #[inline]
+    pub fn partial(&self, clear: bool) -> Partial<f32> {
+        if clear { self.partial.and(self.merged) } else { self.partial }
     }
 
     /// Cosine between its geometric normal and `n`, either way, to about a hundredth.
@@ -121,7 +137,7 @@ impl LightCache {
         let mut cache = Self { pieces, starts, ..Self::default() };
         if merge_radius > 0.0 {
             let all = (0..total).zip(cache.pieces.iter().flatten());
-            let points = all.filter(|(_, v)| v.merges).map(|(i, v)| (v.surface.p, i)).collect();
+            let points = all.filter(|(_, v)| v.merges.is_some()).map(|(i, v)| (v.surface.p, i)).collect();
             cache.grid = PointGrid::new(points, merge_radius);
             cache.merging = cache.grid.numbers().map(|i| MergeVertex::new(i, cache.get(i))).collect();
         }

@@ -14,7 +14,7 @@ use super::split::{Other, Others, both_ways};
 use super::vertex::{Scatter, Vertex};
 use super::walk::{Arrival, Chain, Context, Join, Observe, Tally, Walk, end, sees_light, spawn};
 use super::{Contribution, Record, Technique};
-use crate::local::Equation;
+use crate::local::{Breadth, Equation};
 use crate::math::Random;
 use crate::scene::emitter::EmitterPoint;
 use crate::scene::geometry::Ray;
@@ -65,7 +65,7 @@ pub fn follow<R: Record, O: Observe>(
         k: 0.0,
         p: if p_sensor > 0.0 { p_sensor } else { 1.0 },
         delta: false,
-        focused: false,
+        breadth: Breadth::Wide,
         clear: true,
         merges: None,
         merge: 0.0,
@@ -122,16 +122,16 @@ fn go_on<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let sums = walk.partial(cx, arrival, count, vertex.focused);
+        let sums = walk.partial(cx, arrival, count, vertex.breadth);
         if !vertex.closure.is_delta() {
-            let partial = sums.at(vertex.focused);
+            let partial = sums.at(vertex.breadth.is_narrow());
             if plan.settings.techniques.next_event {
                 next_event(cx, &walk, &vertex, partial, random, tally);
             }
             if let Some(picked) = picked {
                 connect(cx, &walk, &vertex, partial, (lights, picked), random, tally);
             }
-            if walk.length > 0 && !vertex.focused && cx.merges() {
+            if walk.length > 0 && vertex.breadth > Breadth::Sharp && cx.merges() {
                 merge(cx, &walk, &vertex, partial, lights, tally);
             }
         }
@@ -397,12 +397,13 @@ fn connect<R: Record, O: Observe>(
         let light = Vertex::again(scene, y.surface, y.w_back, y.by_material);
         let Some(k_light) = light.kernel(Equation::Potential, -w) else { continue };
         let inv_d2 = 1.0 / d2;
-        // The vertex on the light's side of a merge is focused; which of the two ends that is, is known here.
+        // The vertex on the light's side of a merge is narrow; which of the two ends that is, is known here.
         let merged = |possible: bool, p, clear| if possible && cx.merges() { h.raise(cx.merge_count(p, clear)) } else { 0.0 };
-        let clear = walk.clear && vertex.focused;
-        let at_eye = merged(walk.length > 0 && !vertex.focused && light.focused, vertex.surface.p, walk.clear);
-        let at_light = merged(y.merges, y.surface.p, clear);
-        let behind = if light.focused && clear { y.partial.and(y.by_material) } else { y.partial };
+        let clear = walk.clear && vertex.breadth.is_focused();
+        let at_eye =
+            merged(walk.length > 0 && vertex.breadth > Breadth::Sharp && light.breadth.is_narrow(), vertex.surface.p, walk.clear);
+        let at_light = merged(y.merges.is_some(), y.surface.p, clear);
+        let behind = if light.breadth.is_focused() && clear { y.partial.and(y.by_material) } else { y.partial };
         let weight = mis::connect(
             h,
             plan.c,
@@ -460,7 +461,7 @@ fn meet<R: Record, O: Observe>(
     finish(cx, path, value, join, u32::from(y.length) + 1, tally);
 }
 
-/// Merges `vertex` with the light vertices around it that focused events led to.
+/// Merges `vertex` with the light vertices around it that narrow events led to.
 fn merge<R: Record, O: Observe>(
     cx: Context<'_>,
     walk: &Walk,
@@ -481,10 +482,10 @@ fn merge<R: Record, O: Observe>(
         }
         let Some(k) = vertex.kernel(EQUATION, y.w_back) else { return };
         let count = *count.get_or_insert_with(|| cx.merge_count(vertex.surface.p, walk.clear));
-        let weight = mis::merge(h, count, partial.at(h, k.p_w_rev), y.partial.at(h, k.p_w));
+        let weight = mis::merge(h, count, partial.at(h, k.p_w_rev), y.partial(walk.clear).at(h, k.p_w));
         // Flux per area is irradiance: the kernel's cosine is already in it.
         let cos_g = if planted(Mutant::MergeCosine) { 1.0 } else { k.cos_g };
-        let value = walk.throughput * y.throughput * k.value * (factor * weight / cos_g);
+        let value = walk.throughput * y.throughput() * k.value * (factor * weight / cos_g);
         if value.is_black() {
             return;
         }

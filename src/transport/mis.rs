@@ -19,9 +19,10 @@
 //!
 //! A *merge* at v_i counts a shooting vertex within a radius r as the same vertex: its density is
 //! η G_i S_i with η = Nπr², so 1 over its weight is 1 + (K_i + H_i)/η [Georgiev 2012; Hachisuka
-//! 2012]. Merges are made only where v_{i+1} is a focused event (a Dirac event, or of a material that is nearly a mirror or
-//! clear glass), which next events and mostly hits are blind to, and not at v_1, where splats see it without blur; that is a property of the
-//! path, so weights remain a partition. The gathering walker learns at the event after v_i that the merge at v_i exists,
+//! 2012]. Merges are made only where v_{i+1} is a narrow event ([`Breadth`](crate::local::Breadth): a Dirac event, or of a material that is a mirror or
+//! glass, polished or frosted), which next events are blind to or see by luck, not where v_i is as sharp as a mirror, and not at v_1, where splats
+//! see it without blur; that is a property of the path, so weights remain a partition. Between two sides of frosted glass all other joins ask one
+//! lobe for one direction; a merge asks it for the directions of all light paths around. The gathering walker learns at the event after v_i that the merge at v_i exists,
 //! and adds its term there.
 //!
 //! Two vertices in a corner that light reaches by way of a caustic are badly joined by a connection, whose 1/d² nothing bounds;

@@ -59,7 +59,7 @@ pub enum Technique {
     Connect,
     /// A shooting vertex (or a light point) was seen by the lens: t = 1.
     Splat,
-    /// A gathering vertex and a shooting vertex near it count as one, behind a focused event from the light.
+    /// A gathering vertex and a shooting vertex near it count as one, behind a narrow event from the light.
     Merge,
 }
 

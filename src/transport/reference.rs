@@ -13,6 +13,7 @@ use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
 use super::walk::{Context, Join, Observe};
 use super::{Technique, cache::LightVertex};
+use crate::local::Breadth;
 use crate::scene::emitter::{Emission, EmitterPoint};
 use crate::scene::{Scene, Surface};
 use crate::spectrum::Spectrum;
@@ -40,9 +41,9 @@ pub struct PathVertex {
 }
 
 impl PathVertex {
-    /// It scattered by a Dirac event, or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
-    pub fn is_focused(&self, scene: &Scene) -> bool {
-        self.dirac.is_some() || scene.materials.is_focused(self.surface.material)
+    /// How widely it scattered.
+    pub fn breadth(&self, scene: &Scene) -> Breadth {
+        if self.dirac.is_some() { Breadth::Sharp } else { scene.materials.breadth(self.surface.material) }
     }
 }
 
@@ -70,8 +71,8 @@ pub struct Densities {
     pub nu: f64,
     /// Which of v_1 … v_{k−1} are Dirac events (index as in `g`).
     pub delta: Vec<bool>,
-    /// Which are that or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
-    pub focused: Vec<bool>,
+    /// How widely each scatters.
+    pub breadth: Vec<Breadth>,
     /// How many more light vertices than usual a merge at each finds at once.
     pub crowd: Vec<f64>,
 }
@@ -95,7 +96,8 @@ impl Path {
         let m = self.vertices.len();
         let no = vec![false; k + 1];
         let none = vec![0.0; k + 1];
-        let mut d = Densities { g: none.clone(), s: none.clone(), nu: 0.0, delta: no.clone(), focused: no, crowd: none };
+        let mut d =
+            Densities { g: none.clone(), s: none.clone(), nu: 0.0, delta: no, breadth: vec![Breadth::Wide; k + 1], crowd: none };
         let to_light = self.direction_to_light(scene, self.vertices[m - 1].surface.p);
         let first = self.vertices[0].surface;
         let w = (first.p - self.lens).normalize();
@@ -116,7 +118,7 @@ impl Path {
             };
             d.delta[i + 1] = v.dirac.is_some();
             d.crowd[i + 1] = f64::from(cx.crowd(p));
-            d.focused[i + 1] = v.is_focused(scene);
+            d.breadth[i + 1] = v.breadth(scene);
             if i + 1 < m {
                 d.g[i + 2] = p_gather * jacobian(p, &self.vertices[i + 1].surface);
             } else if !self.light_delta {
@@ -198,16 +200,16 @@ pub fn weights(d: &Densities, plan: &Plan, eta: Eta<f64>) -> Vec<(JoinKey, f64)>
     joins
 }
 
-/// What a merge at v_i counts for: 0 where there is none, since it is seen directly, is focused itself, or lit by what is not.
+/// What a merge at v_i counts for: 0 where there is none, since it is seen directly, is sharp itself, or lit by what is not narrow.
 fn merged_at(d: &Densities, i: usize, eta: Eta<f64>) -> f64 {
-    let possible = i > 1 && !d.focused[i] && d.focused[i + 1];
+    let possible = i > 1 && d.breadth[i] > Breadth::Sharp && d.breadth[i + 1].is_narrow();
     if possible { eta.count(d.is_clear(i), d.crowd[i]) } else { 0.0 }
 }
 
 impl Densities {
     /// All events between the eye and v_i are focused.
     pub fn is_clear(&self, i: usize) -> bool {
-        self.focused[1..i].iter().all(|f| *f)
+        self.breadth[1..i].iter().all(|b| b.is_focused())
     }
 }
 

@@ -21,8 +21,8 @@ pub struct Techniques {
     pub splat: bool,
     /// Gathering vertices are joined to shooting vertices.
     pub connect: bool,
-    /// Gathering vertices that are not seen directly are merged with shooting vertices near them that focused events (Dirac or
-    /// nearly so) lead to: biased by a radius that shrinks from pass to pass, so consistent.
+    /// Gathering vertices that are not seen directly are merged with shooting vertices near them that narrow events
+    /// ([`Breadth`](crate::local::Breadth)) lead to: biased by a radius that shrinks from pass to pass, so consistent.
     pub merge: bool,
 }
 

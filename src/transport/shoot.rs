@@ -10,7 +10,7 @@ use super::mis::{self, Partial};
 use super::vertex::Vertex;
 use super::walk::{Chain, Context, Join, Observe, Tally, Walk, end, free, spawn};
 use super::{Contribution, Record, Technique};
-use crate::local::Equation;
+use crate::local::{Breadth, Equation};
 use crate::math::Random;
 use crate::scene::EmitterId;
 use crate::scene::emitter::Emission;
@@ -82,7 +82,7 @@ pub fn emit<R: Record, O: Observe>(
         k: if hits { 1.0 / h.raise(d.p_k) } else { 0.0 },
         p: d.p_next,
         delta: false,
-        focused: false,
+        breadth: Breadth::Wide,
         clear: true,
         merges: None,
         merge: 0.0,
@@ -117,21 +117,21 @@ pub fn emit<R: Record, O: Observe>(
         } else {
             plan.c
         };
-        let sums = walk.partial(cx, arrival, count, vertex.focused);
-        let merges = walk.focused && !vertex.focused;
+        let sums = walk.partial(cx, arrival, count, vertex.breadth);
+        let merges = (walk.breadth.is_narrow() && vertex.breadth > Breadth::Sharp).then_some(vertex.breadth.is_focused());
         if !vertex.closure.is_delta() {
             if plan.settings.techniques.splat && (length > 1 || plan.splat_direct) {
                 // From here to the eye there is no other event.
-                splat(cx, &walk, &vertex, sums.at(vertex.focused), start, random, tally);
+                splat(cx, &walk, &vertex, sums.at(vertex.breadth.is_focused()), start, random, tally);
             }
             if let Some(cache) = cache.as_mut()
                 && length + 2 <= plan.settings.max_length
-                && (plan.settings.techniques.connect || merges)
+                && (plan.settings.techniques.connect || merges.is_some())
             {
                 cache.push(LightVertex {
                     surface,
                     w_back: vertex.w_back,
-                    by_material: if vertex.focused { sums.merged } else { vertex.learned_back() },
+                    by_material: if vertex.breadth.is_focused() { sums.merged } else { vertex.learned_back() },
                     throughput: walk.throughput,
                     partial: sums.partial,
                     length: length as u16,

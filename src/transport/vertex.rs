@@ -11,7 +11,7 @@
 
 use super::incident::{Incident, LEARNED, Lobes};
 use super::mutant::{Mutant, planted};
-use crate::local::{Closure, Equation, Sample};
+use crate::local::{Breadth, Closure, Equation, Sample};
 use crate::math::Frame;
 use crate::math::warp::ONE_MINUS_EPSILON;
 use crate::scene::{Scene, Surface};
@@ -32,8 +32,8 @@ pub struct Vertex<'a> {
     pub back: Vec3,
     /// `w_back · n_g`, signed.
     pub cos_g_back: f32,
-    /// All its events are [focused](crate::local::Materials::is_focused).
-    pub focused: bool,
+    /// Of all its events.
+    pub breadth: Breadth,
     /// Where the gathering walker has learned that light comes from.
     learned: Learned<'a>,
 }
@@ -76,8 +76,8 @@ pub struct Scatter {
     pub cos_g: f32,
     /// A Dirac event.
     pub delta: bool,
-    /// That, or nearly so: the material is [focused](crate::local::Materials::is_focused).
-    pub focused: bool,
+    /// That of the material, or sharp for a Dirac event.
+    pub breadth: Breadth,
     /// Part of the directions here that gathering takes by the local model.
     pub by_model: f32,
     /// Density of the event relative to that by the local model alone: not 1 where gathering goes where light comes from.
@@ -99,9 +99,9 @@ impl<'a> Vertex<'a> {
         };
         let back = frame.to_local(w_back);
         let closure = scene.materials.resolve(surface.material, surface.uv, back.z > 0.0);
-        let focused = scene.materials.is_focused(surface.material);
+        let breadth = scene.materials.breadth(surface.material);
         let cos_g_back = w_back.dot(surface.n_g);
-        Self { surface, frame, closure, w_back, back, cos_g_back, focused, learned: Learned::Nothing }
+        Self { surface, frame, closure, w_back, back, cos_g_back, breadth, learned: Learned::Nothing }
     }
 
     /// What `incident` knows of this point, if the material is one for which it matters.
@@ -141,7 +141,7 @@ impl<'a> Vertex<'a> {
     #[inline]
     pub fn again(scene: &'a Scene, surface: Surface, w_back: Vec3, learned_back: f32) -> Self {
         let mut vertex = Self::new(scene, surface, w_back);
-        if learned_back >= 0.0 && !vertex.focused {
+        if learned_back >= 0.0 && !vertex.breadth.is_focused() {
             vertex.learned = Learned::Back(learned_back);
         }
         vertex
@@ -253,7 +253,7 @@ impl<'a> Vertex<'a> {
             p_rev: k.p_w_rev,
             cos_g: k.cos_g,
             delta: false,
-            focused: self.focused,
+            breadth: self.breadth,
             by_model: self.by_model(),
             guided: if k.p_w > 0.0 { p / k.p_w } else { 1.0 },
             dirac_ratio: 1.0,
@@ -295,7 +295,7 @@ impl<'a> Vertex<'a> {
             p_rev: s.p_rev,
             cos_g: cos_g.abs(),
             delta: s.delta,
-            focused: s.delta || self.focused,
+            breadth: if s.delta { Breadth::Sharp } else { self.breadth },
             by_model: 1.0,
             guided: 1.0,
             dirac_ratio: s.dirac_ratio,

@@ -11,7 +11,7 @@ use super::mutant::{Mutant, planted};
 use super::settings::Plan;
 use super::vertex::{Scatter, Vertex};
 use super::{RayCounts, Technique};
-use crate::local::Equation;
+use crate::local::{Breadth, Equation};
 use crate::math::Random;
 use crate::scene::emitter::{Emission, EmitterPoint, NextEvent};
 use crate::scene::geometry::{End, Ray, offset_origin};
@@ -98,11 +98,11 @@ pub struct Walk {
     pub p: f32,
     /// The vertex that was left scattered by a Dirac event.
     pub delta: bool,
-    /// It did, or nearly so ([`Materials::is_focused`](crate::local::Materials::is_focused)).
-    pub focused: bool,
+    /// How widely it scattered; of a walk that begins, wide.
+    pub breadth: Breadth,
     /// All events so far were focused, if there were any.
     pub clear: bool,
-    /// Of the gathering walker: there is a merge at the vertex that was left if the next event is focused, with all events before
+    /// Of the gathering walker: there is a merge at the vertex that was left if the next event is narrow, with all events before
     /// focused (`true`) or not.
     pub merges: Option<bool>,
     /// Of the shooting walker: what merges behind add to the MIS sum of the vertex that was left (already raised) if all events
@@ -151,7 +151,7 @@ pub struct Arrival {
 pub struct Sums {
     /// In any case.
     pub partial: Partial<f32>,
-    /// What `b` is more by where the event at the vertex is focused; of the shooting walker, where all events from here to the
+    /// What `b` is more by where the event at the vertex is narrow; of the shooting walker, where all events from here to the
     /// eye are.
     pub merged: f32,
 }
@@ -159,8 +159,8 @@ pub struct Sums {
 impl Sums {
     /// Where that is so, or not.
     #[inline]
-    pub fn at(&self, focused: bool) -> Partial<f32> {
-        if focused { self.partial.and(self.merged) } else { self.partial }
+    pub fn at(&self, so: bool) -> Partial<f32> {
+        if so { self.partial.and(self.merged) } else { self.partial }
     }
 }
 
@@ -177,14 +177,14 @@ impl Walk {
         Arrival { inv_d2, p_a }
     }
 
-    /// MIS sum of the vertex arrived at, where events are focused or not; `count` joins could have made the edge.
+    /// MIS sum of the vertex arrived at, whose events have this breadth; `count` joins could have made the edge.
     #[inline]
-    pub fn partial(&self, cx: Context<'_>, arrival: Arrival, count: f32, focused: bool) -> Sums {
+    pub fn partial(&self, cx: Context<'_>, arrival: Arrival, count: f32, breadth: Breadth) -> Sums {
         let h = cx.plan.settings.heuristic;
         let j = self.cos_from * arrival.inv_d2;
         let partial = Partial::arrive(h, count, arrival.p_a, j, self.k);
         let merge = match self.merges {
-            Some(clear) if focused => h.raise(cx.merge_count(self.from, clear)),
+            Some(clear) if breadth.is_narrow() => h.raise(cx.merge_count(self.from, clear)),
             _ => self.merge,
         };
         // Most walks have none, and where the density underflows 0 / 0 must not enter.
@@ -200,21 +200,23 @@ impl Walk {
         self.guided *= s.guided;
         let resolved =
             |partial: Partial<f32>| if s.delta { partial.at_delta(h, s.p_rev, s.dirac_ratio) } else { partial.at(h, s.p_rev) };
-        self.k = resolved(if equation == Equation::Rendering { sums.at(s.focused) } else { sums.partial });
-        self.merges = (equation == Equation::Rendering && self.length > 0 && !s.focused && cx.merges()).then_some(self.clear);
-        self.merge = match equation {
-            Equation::Rendering => 0.0,
-            Equation::Potential if s.focused => resolved(Partial { a: 0.0, b: sums.merged }),
-            // There is one if the event before was, and it counts for more if all that comes is.
-            Equation::Potential if self.focused && cx.merges() && !planted(Mutant::MergeWeight) => {
+        self.k = resolved(if equation == Equation::Rendering { sums.at(s.breadth.is_narrow()) } else { sums.partial });
+        self.merges = (equation == Equation::Rendering && self.length > 0 && s.breadth > Breadth::Sharp && cx.merges())
+            .then_some(self.clear);
+        self.merge = 0.0;
+        if equation == Equation::Potential {
+            if s.breadth.is_focused() {
+                self.merge = resolved(Partial { a: 0.0, b: sums.merged });
+            }
+            // There is one if the event before was narrow, and it counts for more if all that comes is focused.
+            if self.breadth.is_narrow() && s.breadth > Breadth::Sharp && cx.merges() && !planted(Mutant::MergeWeight) {
                 let [clear, by_chance] = [true, false].map(|clear| h.raise(cx.merge_count(vertex.surface.p, clear)));
                 self.k += by_chance;
-                clear - by_chance
+                self.merge += clear - by_chance;
             }
-            Equation::Potential => 0.0,
-        };
-        self.clear &= s.focused;
-        self.focused = s.focused;
+        }
+        self.clear &= s.breadth.is_focused();
+        self.breadth = s.breadth;
         self.p = s.p;
         self.delta = s.delta;
         self.from = vertex.surface.p;

@@ -40,13 +40,24 @@ fn merges_find_what_hits_find() {
 #[test]
 fn merges_between_events_that_are_nearly_mirrors_count_once() {
     // There no expression tells which paths can be merged: weights alone see to it that none counts twice.
+    count_once("nearly specular", 5, 3);
+}
+
+#[test]
+fn merges_in_frosted_glass_count_once() {
+    count_once("frosted", 7, 5);
+}
+
+/// With and without merges the same, for paths of up to so many edges.
+fn count_once(name: &str, max_length: u32, add: u64) {
     let dir = tempfile::tempdir().unwrap();
-    let world = scene(&scenes::named(dir.path(), "nearly specular"));
-    let effort = Effort { renders: 40, passes: 6, max_length: 5 };
+    let world = scene(&scenes::named(dir.path(), name));
+    let effort = Effort { renders: 40, passes: 6, max_length };
     let of = |techniques, add| series(&world, &settings(techniques, "", 0.01, add), effort);
-    let (hit, all) = (of("hit,nee,splat", 3), of("hit,nee,splat,merge", 4));
-    for k in 2..=effort.max_length as usize {
+    let (hit, all) = (of("hit,nee,splat", add), of("hit,nee,splat,merge", add + 1));
+    for k in 2..=max_length as usize {
         let v = agreement(&hit[k], &all[k]);
+        println!("{name}, length {k}: {:.4e} without merges, {:.4e} with, p = {:.1e}", v.totals.0, v.totals.1, v.p);
         assert!(v.p > 1e-5, "length {k}: {:.4e} without merges, {:.4e} with, p = {:.1e}", v.totals.0, v.totals.1, v.p);
     }
 }

@@ -65,6 +65,18 @@ const NEARLY_SPECULAR: &str = r#"
 <shape type="sphere"><point name="center" value="-0.45, -0.5, -0.3"/><float name="radius" value="0.45"/>
   <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.08"/></bsdf></shape>"#;
 
+/// Every breadth of events: a hollow ball of frosted glass, a ball of brushed metal that is partly inside a polished one, and a near mirror.
+const FROSTED: &str = r#"
+<bsdf type="roughdielectric" id="frosted"><float name="alpha" value="0.2"/><float name="int_ior" value="1.5"/></bsdf>
+<shape type="sphere"><point name="center" value="0.4, -0.5, 0.1"/><float name="radius" value="0.42"/><ref id="frosted"/></shape>
+<shape type="sphere"><point name="center" value="0.4, -0.5, 0.1"/><float name="radius" value="0.34"/><boolean name="flip_normals" value="true"/><ref id="frosted"/></shape>
+<shape type="sphere"><point name="center" value="-0.45, -0.5, -0.3"/><float name="radius" value="0.4"/>
+  <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.4"/></bsdf></shape>
+<shape type="sphere"><point name="center" value="-0.5, 0.2, -0.3"/><float name="radius" value="0.3"/>
+  <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.07"/></bsdf></shape>
+<shape type="sphere"><point name="center" value="-0.1, -0.8, 0.5"/><float name="radius" value="0.2"/>
+  <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.02"/></bsdf></shape>"#;
+
 const PLASTICS: &str = r#"
 <shape type="sphere"><point name="center" value="0.4, -0.55, 0.2"/><float name="radius" value="0.42"/><bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.1, 0.3, 0.6"/><boolean name="nonlinear" value="true"/></bsdf></shape>
 <shape type="sphere"><point name="center" value="-0.45, -0.5, -0.2"/><float name="radius" value="0.45"/><bsdf type="roughplastic"><float name="alpha" value="0.2"/><rgb name="diffuse_reflectance" value="0.6, 0.3, 0.1"/></bsdf></shape>
@@ -174,6 +186,7 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
         scene("glass and mirror", CAMERA, FILM, &[CEILING, AREA, GLASS_AND_MIRROR]),
         scene("rough glass and metal", CAMERA, FILM, &[CEILING, AREA, ROUGH_GLASS]),
         scene("nearly specular", CAMERA, FILM, &[CEILING, AREA, NEARLY_SPECULAR]),
+        scene("frosted", CAMERA, FILM, &[CEILING, AREA, FROSTED]),
         scene("plastics, mask and blend", CAMERA, FILM, &[CEILING, AREA, PLASTICS]),
         scene("shading normals", CAMERA, FILM, &[CEILING, AREA, &coarse]),
         scene("point light", CAMERA, FILM, &[CEILING, point, GLASS_AND_MIRROR]),

@@ -3,6 +3,7 @@
 use crate::scenes;
 use crate::support::{scene, seed, with_lessons};
 use glam::{Vec2, Vec3};
+use nephroid::local::Breadth;
 use nephroid::math::Random;
 use nephroid::math::random::Family;
 use nephroid::transport::cache::LightCache;
@@ -24,7 +25,24 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
     let s: Vec<f64> = (0..=k).map(|_| density()).collect();
     let nu = density();
     let delta: Vec<bool> = (0..=k).map(|i| i > 0 && i < k && random.unit() < 0.35).collect();
-    let focused = (0..=k).map(|i| delta[i] || (i > 0 && i < k && random.unit() < 0.3)).collect();
+    let mut breadth = || match random.unit() {
+        u if u < 0.1 => Breadth::Sharp,
+        u if u < 0.3 => Breadth::Focused,
+        u if u < 0.5 => Breadth::Narrow,
+        _ => Breadth::Wide,
+    };
+    let event = |i: usize| i > 0 && i < k;
+    let breadth = (0..=k)
+        .map(|i| {
+            if delta[i] {
+                Breadth::Sharp
+            } else if event(i) {
+                breadth()
+            } else {
+                Breadth::Wide
+            }
+        })
+        .collect();
     let crowd = (0..=k).map(|_| f64::from(random.unit() * 10.0 - 4.0).exp()).collect();
     if random.unit() < 0.3 {
         g[k] = 0.0;
@@ -41,7 +59,7 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
     let merge_radius = Some((random.unit() * 4.0 - 4.0).exp());
     let settings = Settings { techniques, heuristic, connections, merge_radius, ..Settings::default() };
     let vertices = 0.5 + 3.0 * f64::from(random.unit());
-    (Densities { g, s, nu, delta, focused, crowd }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
+    (Densities { g, s, nu, delta, breadth, crowd }, Plan::new(&settings, 1 + random.below(10_000), 10_000, vertices))
 }
 
 #[test]

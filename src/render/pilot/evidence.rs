@@ -268,7 +268,8 @@ fn gathered(
                     }
                     let merge = t.key.0 == Technique::Merge;
                     if merge {
-                        let clear = t.path.vertices[..merged(&t.path, t.key.1) - 1].iter().all(|v| v.is_focused(pilot.scene));
+                        let clear =
+                            t.path.vertices[..merged(&t.path, t.key.1) - 1].iter().all(|v| v.breadth(pilot.scene).is_focused());
                         *(if clear { &mut merges.clear } else { &mut merges.by_chance }) += 1.0 / share;
                     }
                     let told = evidence((cx, unguided), &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });

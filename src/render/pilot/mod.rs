@@ -15,6 +15,7 @@ mod choice;
 mod evidence;
 mod trail;
 
+use crate::local::Breadth;
 use crate::math::Random;
 use crate::math::random::Family;
 use crate::scene::emitter::Emission;
@@ -293,11 +294,11 @@ impl Observe for Joins<'_> {
         self.tracker.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
-        self.met[0] += u64::from(self.by_chance && !self.scene.materials.is_focused(surface.material));
+        self.met[0] += u64::from(self.by_chance && self.scene.materials.breadth(surface.material) > Breadth::Sharp);
         self.tracker.arrived(surface);
     }
     fn scattered(&mut self, s: &Scatter) {
-        self.by_chance |= !s.focused;
+        self.by_chance |= !s.breadth.is_focused();
         self.tracker.scattered(s);
     }
     fn returned(&mut self, _: usize) {
@@ -319,7 +320,7 @@ struct Footprints {
     /// Pixels per steradian, or per area where rays are parallel.
     density: f32,
     parallel: bool,
-    after_focused: bool,
+    after_narrow: bool,
     found: Vec<f32>,
 }
 impl Observe for Footprints {
@@ -335,16 +336,16 @@ impl Observe for Footprints {
     fn arrived(&mut self, surface: &Surface) {
         self.distance += surface.p.distance(self.last);
         self.last = surface.p;
-        if self.after_focused {
+        if self.after_narrow {
             let spread = if self.parallel { 1.0 } else { self.distance * self.distance };
             self.found.push(spread / self.density);
         }
     }
     fn scattered(&mut self, s: &Scatter) {
-        if s.focused && self.after_focused {
+        if s.breadth.is_narrow() && self.after_narrow {
             self.found.pop();
         }
-        self.after_focused = s.focused;
+        self.after_narrow = s.breadth.is_narrow();
     }
 }
 
@@ -455,7 +456,7 @@ impl<'a> Pilot<'a> {
             owners.extend(shot.owners.into_iter().map(|(path, step)| (path, shifted(step, offset))));
             pieces.push(shot.vertices);
         }
-        let merging: Vec<Vec3> = pieces.iter().flatten().filter(|v| v.merges).map(|v| v.surface.p).collect();
+        let merging: Vec<Vec3> = pieces.iter().flatten().filter(|v| v.merges.is_some()).map(|v| v.surface.p).collect();
         let cache = LightCache::new(pieces, plan.merge_radius);
         // Of N light paths and P pixels per pass, n light paths and n·P/N pixels take part.
         let pixels = f64::from(self.crop[2]) * f64::from(self.crop[3]);
