@@ -2,7 +2,7 @@
 //! paths should start, and how far apart vertices may be to be merged.
 //!
 //! The pilot is a small bidirectional render of the same measurement: some of the pixels gather, a
-//! proportional number of light paths is shot, in rounds that double. After each round the guide of
+//! proportional number of light paths is shot, in rounds that double, and some more where it still learns fast. After each round the guide of
 //! emission is refined by what each light path added to the noise of the image, relative to the image
 //! (as relMSE counts it): the squares of its weighted splats and connections. What the pilot decides
 //! enters weights and densities and must not depend on the samples that are weighted with it; it
@@ -40,6 +40,8 @@ use trail::{NONE, Tracker, Trail, shifted};
 const JOB: u32 = 1024;
 /// Rounds, each of twice the paths of the one before.
 const ROUNDS: u32 = 6;
+/// At most so many more follow, as large as the last, as long as guided emission is still on its way.
+const MORE_ROUNDS: u32 = 8;
 /// Least and most light paths of the last round.
 const LAST_ROUND: std::ops::RangeInclusive<u32> = 4096..=65_536;
 /// A light path counts for at most so many times the mean.
@@ -84,6 +86,12 @@ pub struct Decisions {
     pub incident: Option<Arc<Incident>>,
 }
 
+/// Is guided emission on its way, by the part of light paths that were of use in a round and in the next? Where few find what is seen, as
+/// of a small sun over a pool, it gets on slowly at first, and more is to be gained than where many do.
+fn still_learns([before, now]: [f64; 2]) -> bool {
+    now > if now < 0.25 { 1.1 } else { 1.4 } * before
+}
+
 /// Part of its area that a merge has where a gathering walk comes by chance and would find `usual` light vertices.
 fn part_by_chance(usual: f64) -> f64 {
     (FEW / usual).min(1.0)
@@ -117,11 +125,17 @@ fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let last = (pilot.part(&pilot.plan(&decisions)) / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
     let mut learner = Guide::new(&scene.lights);
     let mut lessons = vec![];
-    for round in 0..ROUNDS {
-        let mut paths = (last >> (ROUNDS - 1 - round)).max(JOB);
+    // Part of the light paths that were of use, in the round before and in the last.
+    let mut of_use = [0.0f64; 2];
+    for round in 0..ROUNDS + MORE_ROUNDS {
+        if round >= ROUNDS && !still_learns(of_use) {
+            break;
+        }
+        let halvings = (ROUNDS - 1).saturating_sub(round);
+        let mut paths = (last >> halvings).max(JOB);
         if round >= CHOICE {
             // Where light paths are few, gathering walks are many: half of a pass is enough, whatever was chosen.
-            paths = paths.min((pilot.part(&pilot.plan(&decisions)) / 2) >> (ROUNDS - 1 - round)).max(JOB);
+            paths = paths.min((pilot.part(&pilot.plan(&decisions)) / 2) >> halvings).max(JOB);
         }
         if round == CHOICE && settings.automatic {
             let (settings, first_seen) = choice::choose(&pilot, &decisions, paths.min(JUDGES));
@@ -140,6 +154,7 @@ fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
             decisions.crowds = Arc::new(found.crowds);
         }
         if settings.guided && t.shoots() {
+            of_use = [of_use[1], found.starts.len() as f64 / f64::from(paths)];
             found.starts.iter().for_each(|(start, value)| learner.learn(start, *value));
             learner = learner.refined(&scene.lights);
             decisions.guide = learner.clone();
