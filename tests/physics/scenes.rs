@@ -65,7 +65,7 @@ const NEARLY_SPECULAR: &str = r#"
 <shape type="sphere"><point name="center" value="-0.45, -0.5, -0.3"/><float name="radius" value="0.45"/>
   <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.08"/></bsdf></shape>"#;
 
-/// Every breadth of events: a hollow ball of frosted glass, a ball of brushed metal that is partly inside a polished one, and a near mirror.
+/// Every breadth of events: a hollow ball of frosted glass, a ball of brushed metal, a polished one, and one that is as good as a mirror.
 const FROSTED: &str = r#"
 <bsdf type="roughdielectric" id="frosted"><float name="alpha" value="0.2"/><float name="int_ior" value="1.5"/></bsdf>
 <shape type="sphere"><point name="center" value="0.4, -0.5, 0.1"/><float name="radius" value="0.42"/><ref id="frosted"/></shape>

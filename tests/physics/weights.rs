@@ -31,16 +31,11 @@ fn random_path(random: &mut Random) -> (Densities, Plan) {
         u if u < 0.5 => Breadth::Narrow,
         _ => Breadth::Wide,
     };
-    let event = |i: usize| i > 0 && i < k;
     let breadth = (0..=k)
-        .map(|i| {
-            if delta[i] {
-                Breadth::Sharp
-            } else if event(i) {
-                breadth()
-            } else {
-                Breadth::Wide
-            }
+        .map(|i| match i {
+            _ if delta[i] => Breadth::Sharp,
+            _ if i == 0 || i == k => Breadth::Wide,
+            _ => breadth(),
         })
         .collect();
     let crowd = (0..=k).map(|_| f64::from(random.unit() * 10.0 - 4.0).exp()).collect();
