@@ -50,7 +50,7 @@ impl Lights {
         let emitter = EmitterId(i as u32);
         match &self.emitters[i] {
             Emitter::Area(area) => {
-                let s = geometry.sample_toward(area.shape, x, u)?;
+                let s = geometry.sample_toward(area.shape, x, u, !area.radiance.is_constant())?;
                 let point = EmitterPoint { emitter, y: s.p, y_error: s.p_error, n_g: s.n_g, uv: s.uv };
                 let (w, distance, inv_d2) = toward(x, s.p)?;
                 let cos = -s.n_g.dot(w);

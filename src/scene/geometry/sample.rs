@@ -64,11 +64,12 @@ impl Geometry {
     }
 
     /// A point of a shape for a next event at `x`: spheres are sampled uniformly in solid angle where
-    /// `x` is outside, all others uniformly by area. `None` where nothing can be drawn.
-    pub fn sample_toward(&self, shape: u32, x: Vec3, u: Vec2) -> Option<ShapePoint> {
+    /// `x` is outside, all others uniformly by area. Texture coordinates are only right if they are wanted. `None` where nothing can
+    /// be drawn.
+    pub fn sample_toward(&self, shape: u32, x: Vec3, u: Vec2, with_uv: bool) -> Option<ShapePoint> {
         if let Sampler::Analytic { index } = self.samplers[shape as usize].0
             && let Analytic::Sphere(sphere) = &self.tree.analytic[index as usize].0
-            && let Some(sample) = sphere.sample_toward(x, u)
+            && let Some(sample) = sphere.sample_toward(x, u, with_uv)
         {
             let mut at = point(sample, 0.0);
             at.p_a = self.density_toward(shape, x, at.p, at.n_g);

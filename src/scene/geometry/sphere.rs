@@ -6,7 +6,7 @@
 
 use super::analytic::{angle, first_root, roots, turns};
 use super::surface::{Local, rounded_error};
-use crate::math::warp::sphere_uniform;
+use crate::math::warp::{sin_cos_turn, sphere_uniform};
 use glam::{DMat3, DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
@@ -128,8 +128,8 @@ impl Sphere {
         Some(1.0 / (2.0 * PI * one_minus_cos(self.sin2_max(x)?)))
     }
 
-    /// A point uniform in solid angle as seen from x; `None` as for the density.
-    pub(super) fn sample_toward(&self, x: Vec3, u: Vec2) -> Option<(DVec3, DVec3, Vec2)> {
+    /// A point uniform in solid angle as seen from x, with texture coordinates if they are wanted; `None` as for the density.
+    pub(super) fn sample_toward(&self, x: Vec3, u: Vec2, with_uv: bool) -> Option<(DVec3, DVec3, Vec2)> {
         let sin2_max = self.sin2_max(x)?;
         let m = f64::from(u.x) * one_minus_cos(sin2_max);
         let (cos, sin2) = (1.0 - m, m * (2.0 - m));
@@ -138,9 +138,11 @@ impl Sphere {
         let sin_a = (1.0 - cos_a * cos_a).max(0.0).sqrt();
         let axis = (x.as_dvec3() - self.center).normalize();
         let (s, t) = axis.any_orthonormal_pair();
-        let (sin_phi, cos_phi) = (2.0 * PI * f64::from(u.y)).sin_cos();
-        let out = (s * (sin_a * cos_phi) + t * (sin_a * sin_phi) + axis * cos_a).normalize();
-        Some(self.point(out))
+        // Rounded, the angle is another one nearby; the point is on the sphere all the same.
+        let (sin_phi, cos_phi) = sin_cos_turn(u.y);
+        let out = (s * (sin_a * f64::from(cos_phi)) + t * (sin_a * f64::from(sin_phi)) + axis * cos_a).normalize();
+        let uv = if with_uv { uv(self.own(out)) } else { Vec2::ZERO };
+        Some((self.center + out * self.radius, out * self.side, uv))
     }
 }
 

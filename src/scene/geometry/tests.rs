@@ -315,7 +315,7 @@ fn spheres_are_sampled_uniformly_in_the_cone() {
         let n = 20_000;
         for i in 0..n {
             let u = Vec2::new((i as f32 + r.unit()) / n as f32, r.unit());
-            let Some(s) = g.sample_toward(0, x, u) else { continue };
+            let Some(s) = g.sample_toward(0, x, u, true) else { continue };
             assert_eq!(s.p_a, g.density_toward(0, x, s.p, s.n_g));
             let d = (x - s.p).as_dvec3();
             let cos = s.n_g.as_dvec3().dot(d).abs() / d.length();
