@@ -84,9 +84,19 @@ fn recursion_is_the_definition_for_100_000_random_paths() {
 
 /// All joins that a few walks through a scene made, with their whole paths.
 fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scene::Scene, Plan, Vec<Testimony>) {
+    testimonies_of_passes(xml, settings, wanted, 64)
+}
+
+/// The same from passes of so many walks of either kind.
+fn testimonies_of_passes(
+    xml: &str,
+    settings: &Settings,
+    wanted: usize,
+    walks: u32,
+) -> (nephroid::scene::Scene, Plan, Vec<Testimony>) {
     let world = scene(xml);
     let film = world.film.clone();
-    let plan = with_lessons(&world, settings, Plan::new(settings, 64, film.width * film.height, 2.0));
+    let plan = with_lessons(&world, settings, Plan::new(settings, walks, film.width * film.height, 2.0));
     // Some places are crowded, as if a pilot had been there.
     let mut shot = Vec::new();
     for i in 0..256 {
@@ -104,13 +114,13 @@ fn testimonies(xml: &str, settings: &Settings, wanted: usize) -> (nephroid::scen
         let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut witness };
         let mut vertices = Vec::new();
         tally.observe.expect_shooting(true);
-        for i in 0..64 {
+        for i in 0..walks.into() {
             let mut random = Random::new(Family::Shoot, i, pass, seed());
             shoot(cx, Some(&mut vertices), &mut random, &mut tally);
         }
         let cache = LightCache::new(vec![vertices], plan.merge_radius(0));
         tally.observe.expect_shooting(false);
-        for i in 0..64 {
+        for i in 0..walks.into() {
             let mut random = Random::new(Family::Gather, i, pass, seed());
             let at = Vec2::new(crop[0] as f32, crop[1] as f32);
             let raster = at + random.unit2() * Vec2::new(crop[2] as f32, crop[3] as f32);
@@ -234,6 +244,39 @@ fn connections_know_the_merges_at_their_ends() {
     let bad = differing(&world, &plan, &seen);
     assert!(seen.len() > 100, "{} connections", seen.len());
     assert!(bad.len() * 50 <= seen.len(), "{} of {}: {}", bad.len(), seen.len(), bad[..bad.len().min(5)].join("\n"));
+}
+
+/// A room of polished metal: all events of all paths are focused, and a path can be merged at each of its vertices but the first and
+/// those at the lamp.
+const POLISHED: &str = r#"<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="70"/>
+  <transform name="to_world"><lookat origin="0.1, 0.05, 0.9" target="0, 0.1, 0" up="0, 1, 0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="48"/><rfilter type="box"/></film></sensor>
+<shape type="cube"><boolean name="flip_normals" value="true"/>
+  <bsdf type="roughconductor"><string name="material" value="none"/><float name="alpha" value="0.08"/></bsdf></shape>
+<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/><translate y="0.97"/></transform>
+  <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="9, 8, 6"/></emitter></shape>
+</scene>"#;
+
+/// Where a path could be merged nearer to the eye is part of the weight of a merge, more so where all is focused up to there. The radius
+/// makes weights uncertain by a part of a lobe's width; what is forgotten is far more.
+#[test]
+fn merges_know_the_merges_nearer_to_the_eye() {
+    let techniques = Techniques::parse("merge").unwrap();
+    let settings = Settings { techniques, merge_radius: Some(3e-3), max_length: 6, guided: false, ..Settings::default() };
+    let (world, plan, seen) = testimonies_of_passes(POLISHED, &settings, 8000, 4096);
+    let (mut tested, mut far) = (0, vec![]);
+    for t in seen {
+        let all = t.path.weights(Context::new(&world, &plan, 0));
+        let defined = all.iter().find(|w| w.0 == t.key).map_or(0.0, |w| w.1);
+        if all.iter().filter(|w| w.1 > 0.05).count() > 1 {
+            tested += 1;
+            far.extend(
+                ((f64::from(t.weight) - defined).abs() > 0.05).then(|| format!("{} instead of {defined} of {all:?}", t.weight)),
+            );
+        }
+    }
+    println!("{} of {tested} far off", far.len());
+    assert!(tested > 100 && far.len() * 4 <= tested, "{} of {tested}: {}", far.len(), far[..far.len().min(5)].join("\n"));
 }
 
 /// The two vertices of a merge are some distance apart, so the walks know densities at one of them and
