@@ -31,7 +31,7 @@ const MARGIN: i64 = MAX_RADIUS as i64 + 1;
 /// Film and lens of a sample of chains; all of a pixel share a sequence.
 const CHAIN_AXES: u32 = 4;
 /// Film, lens and the first vertices of a gathering walk; all passes of a pixel share a sequence.
-const GATHER_AXES: u32 = 16;
+pub(super) const GATHER_AXES: u32 = 16;
 
 /// Hands what gathering walks find to the pixel being sampled.
 struct PixelRecord<F>(F);

@@ -64,6 +64,11 @@ pub enum Technique {
 }
 
 impl Technique {
+    /// Gathering walks find it, each for itself: what two find has nothing in common.
+    pub(crate) fn gathers_alone(self) -> bool {
+        matches!(self, Self::Hit | Self::NextEvent | Self::Connect)
+    }
+
     /// All, in the order of their numbers.
     pub const ALL: [Self; 5] = [Self::Hit, Self::NextEvent, Self::Connect, Self::Splat, Self::Merge];
 

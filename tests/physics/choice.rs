@@ -36,6 +36,15 @@ const BULB: &str = r#"<shape type="sphere"><point name="center" value="0, 0.6, 0
 const SHELL: &str = r#"<shape type="sphere"><point name="center" value="0, 0.6, 0"/><float name="radius" value="0.3"/>
   <bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf></shape>"#;
 
+/// Water over the floor, under a point light.
+fn wet() -> String {
+    room(
+        r#"<emitter type="point"><point name="position" value="0.3, 1.8, 0.2"/><rgb name="intensity" value="3"/></emitter>
+<shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/><translate y="0.3"/></transform>
+  <bsdf type="dielectric"><float name="int_ior" value="1.33"/><float name="ext_ior" value="1"/></bsdf></shape>"#,
+    )
+}
+
 #[test]
 fn shadow_rays_end_where_glass_is_around_every_light() {
     assert!(chosen(&room(BULB)).settings.techniques.next_event);
@@ -54,14 +63,23 @@ fn matt_rooms_are_gathered() {
 #[test]
 fn merges_stay_where_nothing_else_sees() {
     let dir = tempfile::tempdir().unwrap();
-    let wet = chosen(&room(
-        r#"<emitter type="point"><point name="position" value="0.3, 1.8, 0.2"/><rgb name="intensity" value="3"/></emitter>
-<shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/><translate y="0.3"/></transform>
-  <bsdf type="dielectric"><float name="int_ior" value="1.33"/><float name="ext_ior" value="1"/></bsdf></shape>"#,
-    ));
+    let wet = chosen(&wet());
     assert!(wet.settings.techniques.merge && wet.merge_radius > 0.0);
     let dry = chosen(&scenes::named(dir.path(), "diffuse box"));
     assert!(!dry.settings.techniques.merge);
+}
+
+/// Under water all is bright and smooth that next events find, and says nothing against light paths.
+#[test]
+fn the_choice_does_not_hang_on_luck() {
+    let world = scene(&wet());
+    for i in 0..6 {
+        let plan = Render::new(&world, &automatic(&world, seed() * 10 + i)).unwrap().plan().clone();
+        let t = plan.settings.techniques;
+        println!("{t:?}, {} light paths", plan.light_paths);
+        assert!(t.next_event && t.splat && t.merge, "{t:?}");
+        assert!((8192..=16_384).contains(&plan.light_paths), "{} light paths", plan.light_paths);
+    }
 }
 
 #[test]

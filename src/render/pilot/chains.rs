@@ -2,8 +2,8 @@
 
 use super::Pilot;
 use super::branching::Branching;
-use crate::math::Random;
 use crate::math::random::Family;
+use crate::math::{Random, limit};
 use crate::transport::chain;
 use crate::transport::first_seen::FirstSeen;
 use crate::transport::settings::Plan;
@@ -23,6 +23,12 @@ const BRIGHT: usize = 512;
 /// and samples of each. An image of a lamp behind several balls of glass is met once in thousands of samples, so what one
 /// lucky sample says of a pixel must not be compared with itself.
 const LONGER_LOOKS: u32 = 128;
+
+/// A single pixel counts for at most this part of the noise of all: where a second look misses what one lucky sample of the first
+/// found, a pixel says anything, but so do not four.
+const MOST: f64 = 0.25;
+/// Steps towards that.
+const CLIPPINGS: u32 = 32;
 
 /// What one sample of chains per pixel leaves of noise in a pass, and its rays.
 #[derive(Clone, Copy, Debug, Default)]
@@ -61,14 +67,16 @@ impl ChainNoise {
         let few: Vec<(Vec2, f64)> = differ.iter().step_by(differ.len().div_ceil(BRIGHT).max(1)).copied().collect();
         let again: Vec<Vec2> = few.iter().map(|(pixel, _)| *pixel).collect();
         let (bright, _) = looked(pilot, plan, &again, (LONGER_LOOKS, 1 << 32));
-        let noise: f64 = few
+        let relative: Vec<f64> = few
             .iter()
             .zip(&bright)
             .filter_map(|((pixel, variance), (mean, _))| {
                 let relative = variance / (mean * mean + dark_squares[pilot.cell(*pixel)? as usize]);
                 relative.is_finite().then_some(relative)
             })
-            .sum();
+            .collect();
+        let most = limit(relative.iter().copied(), MOST, CLIPPINGS);
+        let noise: f64 = relative.iter().map(|r| r.min(most)).sum();
         let samples = pixels.len() as f64 * f64::from(LOOKS);
         let times = |all: usize, some: usize| all as f64 / some.max(1) as f64;
         Self {

@@ -1,26 +1,14 @@
 //! The choice of techniques: what each join is worth for this picture, against what it costs.
 //!
-//! A mixture of all joins finds paths with density Σ n_τ p_τ; with the balance heuristic each brings
-//! the contribution C = f / Σ n_τ p_τ. Other numbers n'_τ of the same joins would have found it with ρ
-//! times that density,
-//!
-//! ```text
-//! ρ = Σ_τ r_τ n'_τ / n_τ,     r_τ = n_τ p_τ / Σ n_τ p_τ  (the joins' weights)
-//! ```
-//!
-//! so that the second moment of an estimator with n' is E[Σ C² / ρ], over the same paths
-//! [Grittmann 2022, eq. 9]. Relative to the square of the picture and summed over it, that is the
-//! noise of a pass as relMSE counts it; times the cost of a pass it is the error at equal time. One
-//! mixture judges all candidates, also on paths that they would hardly ever find themselves.
-//!
-//! Costs are counts of operations times fixed weights ([`Costs`]), so that the choice is a
-//! function of scene, settings and seed alone.
+//! The noise that a pass of a candidate would have ([`super::noise`]), relative to the picture and summed over it as relMSE counts it,
+//! times the cost of a pass is the error at equal time. Costs are counts of operations times fixed weights ([`Costs`]), so that the
+//! choice is a function of scene, settings and seed alone.
 
 use super::branching::LEAST;
 use super::chains::{ChainNoise, SAMPLES};
 use super::evidence::{Evidence, Findings};
-use super::{Decisions, Pilot, part_by_chance};
-use crate::transport::Technique;
+use super::noise::{LOST, Mixture};
+use super::{Decisions, Pilot};
 use crate::transport::first_seen::FirstSeen;
 use crate::transport::mis::Heuristic;
 use crate::transport::settings::{Plan, Settings, Techniques};
@@ -28,12 +16,12 @@ use std::sync::Arc;
 
 /// Light paths per pixel that are considered.
 const LIGHT_PATHS: [f64; 6] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// Paths that a candidate finds less often than this are as good as lost to it.
-const LOST: f64 = 1e-5;
 /// Merging blurs, so it must win by this factor.
 const MERGE_MUST_WIN: f64 = 1.25;
 /// Everything is on unless doing without wins by this factor: the estimate has noise itself.
 const LESS_MUST_WIN: f64 = 1.02;
+/// Without light paths a pilot learns nothing more, so that must win by this factor while there is something to learn.
+const NO_LESSONS_MUST_WIN: f64 = 2.0;
 /// Guided gathering must win by this factor.
 const GUIDE_MUST_WIN: f64 = 1.1;
 /// Cost of operations, in units of a step of a gathering walk: user time of passes of five scenes with and
@@ -69,44 +57,26 @@ const COSTS: Costs = Costs {
     directions: 1.0,
 };
 
+/// What techniques are chosen for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Chosen {
+    /// Rounds that go on learning: what light paths could be worth is not known yet.
+    ForRounds,
+    ForRender,
+}
+
 /// Numbers of joins that could be used.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Candidate {
-    light_paths: f64,
-    next_event: bool,
-    connect: bool,
-    merge: bool,
-}
-
-/// What the paths were found by that judge candidates.
-struct Mixture {
+pub(super) struct Candidate {
     /// Per pixel.
-    light_paths: f64,
-    /// Light vertices within the largest radius of merges.
-    usual: f64,
-    /// Part of the area in which they are merged by chance.
-    by_chance: f64,
-}
-
-impl Mixture {
-    fn of(plan: &Plan, pixels: u32) -> Self {
-        let light_paths = f64::from(plan.light_paths) / f64::from(pixels);
-        Self { light_paths, usual: plan.crowds.usual().into(), by_chance: plan.by_chance.into() }
-    }
-
-    /// How many times its light paths `light_paths` per pixel are.
-    fn times(&self, light_paths: f64) -> f64 {
-        if self.light_paths > 0.0 { light_paths / self.light_paths } else { 0.0 }
-    }
-
-    /// How many more merges are met by chance with `n` times the light paths.
-    fn by_chance(&self, n: f64) -> f64 {
-        n * part_by_chance(n * self.usual) / self.by_chance
-    }
+    pub(super) light_paths: f64,
+    pub(super) next_event: bool,
+    pub(super) connect: bool,
+    pub(super) merge: bool,
 }
 
 impl Candidate {
-    fn all(settings: &Settings, pixels: u32) -> Vec<Self> {
+    fn all(settings: &Settings, pixels: u32, chosen: Chosen) -> Vec<Self> {
         let allowed = settings.techniques;
         let given = settings.light_paths.map(|n| vec![f64::from(n) / f64::from(pixels)]);
         let either = |allowed: bool| if allowed { &[true, false][..] } else { &[false][..] };
@@ -114,9 +84,12 @@ impl Candidate {
         for light_paths in given.unwrap_or_else(|| LIGHT_PATHS.to_vec()) {
             for &next_event in either(allowed.next_event) {
                 for &connect in either(allowed.connect && light_paths > 0.0) {
-                    for &merge in either(allowed.merge && light_paths > 0.0) {
-                        all.push(Self { light_paths, next_event, connect, merge });
-                    }
+                    let merges = match chosen {
+                        _ if !allowed.merge || light_paths == 0.0 => &[false][..],
+                        Chosen::ForRounds => &[true],
+                        Chosen::ForRender => &[true, false],
+                    };
+                    all.extend(merges.iter().map(|&merge| Self { light_paths, next_event, connect, merge }));
                 }
             }
         }
@@ -130,42 +103,10 @@ impl Candidate {
         Self { light_paths, next_event: t.next_event, connect: t.connect, merge: t.merge }
     }
 
-    /// Of a pass, from what the mixture of all joins found.
-    fn noise(&self, evidence: &[Evidence], mixture: &Mixture) -> f64 {
-        let on = |b: bool| if b { 1.0 } else { 0.0 };
-        let n = mixture.times(self.light_paths);
-        // Where merges find a crowd at once, more light paths make it larger, not more often found.
-        let chance = mixture.by_chance(n);
-        let merges = |e: &Evidence| {
-            let by_chance = chance * (1.0 + e.crowd) / (1.0 + chance * e.crowd);
-            on(self.merge) * (n * (1.0 - e.by_chance) + by_chance * e.by_chance)
-        };
-        let numbers = |e: &Evidence| {
-            Technique::ALL.map(|technique| match technique {
-                Technique::Hit => 1.0,
-                Technique::NextEvent => on(self.next_event),
-                Technique::Connect => on(self.connect),
-                Technique::Splat => n,
-                Technique::Merge => merges(e),
-            })
-        };
-        let one = |e: &Evidence| {
-            let rho: f64 = e.shares.iter().zip(numbers(e)).map(|(r, n)| r * n).sum();
-            e.square / rho.max(LOST)
-        };
-        self.noisy(evidence).map(one).sum()
-    }
-
-    /// What brings noise: not delta lights seen by next events; what chains vary is measured apart.
-    fn noisy<'e>(&self, evidence: &'e [Evidence]) -> impl Iterator<Item = &'e Evidence> {
-        let next_event = self.next_event;
-        evidence.iter().filter(move |e| e.chain.is_none() && !(e.steady && next_event))
-    }
-
     /// Per pixel.
     fn cost(&self, found: &Findings, mixture: &Mixture) -> f64 {
         let n = mixture.times(self.light_paths);
-        let merges = n * found.merges.clear + mixture.by_chance(n) * found.merges.by_chance;
+        let merges = mixture.shrunk * (n * found.merges.clear + mixture.by_chance(n) * found.merges.by_chance);
         let (eye, light) = (&found.eye, &found.light);
         let c = COSTS;
         let on = |b: bool, cost: f64| if b { cost } else { 0.0 };
@@ -200,7 +141,7 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
     // Gathering walks are more than light paths where those are few.
     let part = if plan.light_paths > 0 { candidate.light_paths.clamp(0.125, 1.0) } else { 1.0 };
     let paths = (f64::from(most) * part) as u32;
-    let found = Findings::collected(pilot, plan, &pilot.dark_squares(), paths);
+    let found = Findings::collected(pilot, plan, &pilot.dark_squares(), (paths, false));
     let noise = |unguided: bool| {
         let one = |e: &Evidence| e.square / if unguided { e.unguided.max(LOST) } else { 1.0 };
         candidate.noisy(&found.evidence).map(one).sum::<f64>()
@@ -211,31 +152,36 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
 }
 
 /// The settings of the best candidate, judged on `paths` light paths and as large a part of the pixels; and what pixels see first.
-pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> (Settings, Arc<FirstSeen>) {
+pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32, chosen: Chosen) -> (Settings, Arc<FirstSeen>) {
     let mut plan = pilot.plan(decisions);
     plan.settings.heuristic = Heuristic::Balance;
     let dark_squares = pilot.dark_squares();
     let mixture = Mixture::of(&plan, pilot.pixels());
     let follows = pilot.settings.follows_chains();
     let look = || FirstSeen::looked_at(pilot.scene, pilot.crop, pilot.settings.seed);
-    let first_seen = if follows { look() } else { FirstSeen::default() };
-    let chains = ChainNoise::measured(pilot, &plan, &first_seen, &dark_squares);
+    let first_seen = if follows && decisions.first_seen.is_unknown() { Arc::new(look()) } else { decisions.first_seen.clone() };
+    let chains = match chosen {
+        // No round has samples of chains alone.
+        Chosen::ForRounds => ChainNoise::default(),
+        Chosen::ForRender => ChainNoise::measured(pilot, &plan, &first_seen, &dark_squares),
+    };
     if follows {
         plan.settings.faint = LEAST;
     }
-    let found = Findings::collected(pilot, plan, &dark_squares, paths);
+    let found = Findings::collected(pilot, plan, &dark_squares, (paths, true));
     let branchings = found.branchings(pilot.settings.faint);
     let ways: Vec<_> = branchings.iter().flat_map(|b| SAMPLES.map(|samples| (b, samples))).collect();
     let pixels = pilot.pixels();
-    let candidates = Candidate::all(pilot.settings, pixels);
+    let candidates = Candidate::all(pilot.settings, pixels, chosen);
     let judged = candidates.iter().flat_map(|c| {
         let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };
+        let early = if chosen == Chosen::ForRounds && c.light_paths == 0.0 { NO_LESSONS_MUST_WIN } else { 1.0 };
         let lacks = if c.next_event && c.connect { 1.0 } else { LESS_MUST_WIN };
-        let (noise, cost) = (c.noise(&found.evidence, &mixture), c.cost(&found, &mixture));
+        let (noise, cost) = (c.noise(&found, &mixture), c.cost(&found, &mixture));
         ways.iter().map(move |(b, samples)| {
             let noise = noise + chains.noise(b, *samples);
             let cost = cost + COSTS.branch * b.rays + chains.cost(*samples, COSTS.look, COSTS.branch);
-            (noise * cost * blurs * lacks, c, (b.faint, *samples))
+            (noise * cost * blurs * lacks * early, c, (b.faint, *samples))
         })
     });
     let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
@@ -244,5 +190,5 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32) -> (S
         chain_samples,
         ..c.settings(pilot.settings, pixels)
     };
-    (best.map_or_else(|| pilot.settings.clone(), with), Arc::new(first_seen))
+    (best.map_or_else(|| pilot.settings.clone(), with), first_seen)
 }

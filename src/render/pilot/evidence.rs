@@ -4,6 +4,7 @@ use super::branching::{BranchRays, Branching};
 use super::{Cell, JOB, Pilot};
 use crate::math::random::Family;
 use crate::math::{Random, limit};
+use crate::render::passes::GATHER_AXES;
 use crate::scene::Surface;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
@@ -19,6 +20,8 @@ use std::sync::Arc;
 
 /// A single path counts for at most this part of all: one that luck found must not decide.
 const MOST: f64 = 5e-3;
+/// Walks of a pixel that share a sequence of points, as in a render; each pixel has two such sets.
+pub(super) const SET: u32 = 8;
 /// Steps towards the bound of what a path can say.
 const CLIPPINGS: u32 = 16;
 
@@ -37,6 +40,12 @@ pub(super) struct Counts {
 pub(super) struct Evidence {
     /// C² relative to the square of the picture, as a whole pass would find it.
     pub(super) square: f64,
+    /// C relative to the picture.
+    pub(super) value: f64,
+    /// The join that found it.
+    pub(super) technique: Technique,
+    /// Number of the walk that found it.
+    pub(super) walk: u32,
     /// r_τ by the number of the join.
     pub(super) shares: [f64; Technique::ALL.len()],
     /// Part of the merges' r that is met by chance.
@@ -166,13 +175,15 @@ pub(super) struct Findings {
     pub(super) light: Counts,
     /// Merges per gathering walk, with as many light paths as the plan has.
     pub(super) merges: Merges,
+    /// What walks found that came in sets of [`SET`], two for each pixel.
+    pub(super) sets: Vec<Evidence>,
     branches: BranchRays,
     walks: u32,
 }
 
 impl Findings {
-    /// From `paths` light paths and as large a part of the pixels, all joins of `plan` on.
-    pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, dark_squares: &[f64], paths: u32) -> Self {
+    /// From `paths` light paths and as large a part of the pixels, all joins of `plan` on; with walks in sets if these are wanted.
+    pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, dark_squares: &[f64], (paths, with_sets): (u32, bool)) -> Self {
         let share = f64::from(paths) / f64::from(pilot.part(&plan).max(1));
         let squares = pilot.squares();
         let unguided = plan.incident.is_some().then(|| Plan { incident: None, ..plan.clone() });
@@ -181,15 +192,26 @@ impl Findings {
         let cache = LightCache::new(pieces, plan.merge_radius);
         let walks = (f64::from(pilot.pixels()) * share).ceil() as u32;
         plan.inv_light_paths = 1.0 / paths as f32;
-        let eye =
-            gathered(pilot, (&plan, unguided.as_ref()), (&squares, dark_squares), (walks, share), &cache, &Arc::new(subpaths));
+        let subpaths = Arc::new(subpaths);
+        let gathered = |walks, share, sets| {
+            gathered(pilot, (&plan, unguided.as_ref()), (&squares, dark_squares), (walks, share, sets), &cache, &subpaths)
+        };
+        let eye = gathered(walks, share, false);
+        let in_sets = if with_sets { (walks / 2).next_multiple_of(2 * SET) } else { 0 };
+        let sets = gathered(in_sets, f64::from(in_sets) / f64::from(pilot.pixels()), true).evidence;
         let per_walk = |n: f64| n / f64::from(walks.max(1));
         let merges = Merges { clear: per_walk(eye.merges.clear), by_chance: per_walk(eye.merges.by_chance) };
         let light = shot.per_walk();
-        let mut found = Self { eye: eye.per_walk(), light, merges, branches: eye.branches, evidence: eye.evidence, walks };
+        let mut found = Self { eye: eye.per_walk(), light, merges, branches: eye.branches, evidence: eye.evidence, sets, walks };
         found.evidence.extend(shot.evidence);
         clip(&mut found.evidence);
         found
+    }
+
+    #[cfg(test)]
+    pub(super) fn of(evidence: Vec<Evidence>, sets: Vec<Evidence>) -> Self {
+        let nothing = (Counts::default(), Merges::default(), BranchRays::default());
+        Self { evidence, sets, eye: nothing.0, light: nothing.0, merges: nothing.1, branches: nothing.2, walks: 0 }
     }
 
     /// What comes of following branches down to this or that share.
@@ -221,7 +243,7 @@ fn shot(
             }
             watch.counts.steps = rays.shoot as f64;
             let seen = watch.witness.seen.iter().zip(&splats.0);
-            let tell = |t, cell: Cell| evidence((cx, unguided), t, squares[cell as usize], 1.0 / share);
+            let tell = |t, cell: Cell| evidence((cx, unguided), t, squares[cell as usize], share);
             let evidence = seen.filter_map(|(t, raster)| tell(t, pilot.cell(*raster)?)).collect();
             let found = Found { evidence, counts: watch.counts, ..Found::default() };
             (found, vertices, watch.witness.into_subpaths())
@@ -241,7 +263,7 @@ fn gathered(
     pilot: &Pilot<'_>,
     (plan, unguided): (&Plan, Option<&Plan>),
     (squares, dark_squares): (&[f64], &[f64]),
-    (walks, share): (u32, f64),
+    (walks, share, sets): (u32, f64, bool),
     cache: &LightCache,
     subpaths: &Arc<Vec<Subpath>>,
 ) -> Found {
@@ -254,8 +276,13 @@ fn gathered(
             let mut rays = RayCounts::default();
             let (mut found, mut merges) = (vec![], Merges::default());
             for index in job * JOB..((job + 1) * JOB).min(walks) {
-                let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 35, 0, plan.settings.seed);
-                let raster = pilot.raster(index, walks, &mut random);
+                let (mut random, raster) = if sets {
+                    of_set(pilot, plan, index, walks)
+                } else {
+                    let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 35, 0, plan.settings.seed);
+                    let raster = pilot.raster(index, walks, &mut random);
+                    (random, raster)
+                };
                 let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut watch };
                 gather(cx, raster, 1.0, cache, &mut random, &mut tally);
                 let Some(cell) = pilot.cell(raster) else { continue };
@@ -267,15 +294,18 @@ fn gathered(
                         continue;
                     }
                     let merge = t.key.0 == Technique::Merge;
+                    if merge && sets {
+                        continue;
+                    }
                     if merge {
                         let clear =
                             t.path.vertices[..merged(&t.path, t.key.1) - 1].iter().all(|v| v.breadth(pilot.scene).is_focused());
                         *(if clear { &mut merges.clear } else { &mut merges.by_chance }) += 1.0 / share;
                     }
-                    let told = evidence((cx, unguided), &t, squares[cell as usize], if merge { 1.0 } else { 1.0 / share });
+                    let told = evidence((cx, unguided), &t, squares[cell as usize], share);
                     // A lamp's image shines on its cell alone, its reflections on dark ones around it.
                     let darker = if chain.is_some() { squares[cell as usize] / dark_squares[cell as usize] } else { 1.0 };
-                    found.extend(told.map(|e| Evidence { chain, square: e.square * darker, ..e }));
+                    found.extend(told.map(|e| Evidence { walk: index, chain, square: e.square * darker, ..e }));
                 }
             }
             watch.counts.steps = rays.gather as f64 - watch.branches.all;
@@ -283,6 +313,20 @@ fn gathered(
         })
         .collect();
     found.into_iter().fold(Found::default(), Found::join)
+}
+
+/// A walk of a set, and its start.
+fn of_set(pilot: &Pilot<'_>, plan: &Plan, index: u32, walks: u32) -> (Random, Vec2) {
+    let seed = plan.settings.seed;
+    let (pair, set) = (index / (2 * SET), index / SET);
+    let numbers = |i: u32| Random::new(Family::Pilot, u64::from(i) | 1 << 38, 0, seed);
+    let pixel = pilot.pixel(pair, walks / (2 * SET), &mut numbers(pair));
+    let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 39, 0, seed);
+    if plan.settings.stratified {
+        random = random.with_point(Family::Pilot, u64::from(set) | 1 << 39, u64::from(index % SET), seed, GATHER_AXES);
+    }
+    let raster = pixel + random.axis2();
+    (random, raster)
 }
 
 /// The number of the vertex (1: the first from the eye) at which a merge joined a path to `s` vertices that shooting made.
@@ -300,7 +344,7 @@ fn clip(evidence: &mut [Evidence]) {
 }
 
 /// `unguided`: the plan without guided gathering, where it has that. Shares are those of the balance heuristic.
-fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square: f64, often: f64) -> Option<Evidence> {
+fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square: f64, share: f64) -> Option<Evidence> {
     let value = f64::from(t.value.mean());
     if !(value > 0.0 && value.is_finite() && square > 0.0) {
         return None;
@@ -333,8 +377,13 @@ fn evidence((cx, unguided): (Context<'_>, Option<&Plan>), t: &Testimony, square:
         total(&products(&t.path.densities(cx), plan, cx.eta.into())) / density
     });
     let steady = t.path.light_delta && t.path.vertices.len() == 1;
+    // Of merges, each is as much more worth as it is more rare in a part of a pass.
+    let often = if t.key.0 == Technique::Merge { 1.0 } else { 1.0 / share };
     (shares.iter().sum::<f64>().is_finite() && unguided.is_finite()).then_some(Evidence {
         square: often * at_once * value * value / square,
+        value: value / square.sqrt() * if t.key.0 == Technique::Merge { share } else { 1.0 },
+        technique: t.key.0,
+        walk: 0,
         shares,
         by_chance,
         crowd,
@@ -352,6 +401,9 @@ mod tests {
     fn luck_does_not_decide() {
         let of = |square| Evidence {
             square,
+            value: 0.0,
+            technique: Technique::Hit,
+            walk: 0,
             shares: [1.0, 0.0, 0.0, 0.0, 0.0],
             by_chance: 0.0,
             crowd: 0.0,

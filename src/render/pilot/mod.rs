@@ -13,6 +13,8 @@ mod branching;
 mod chains;
 mod choice;
 mod evidence;
+mod lessons;
+mod noise;
 mod trail;
 
 use crate::local::Breadth;
@@ -31,7 +33,9 @@ use crate::transport::shoot::shoot;
 use crate::transport::vertex::Scatter;
 use crate::transport::walk::{Context, Join, Observe, Tally};
 use crate::transport::{Contribution, RayCounts, Record, Technique};
+use choice::Chosen;
 use glam::{Vec2, Vec3};
+use lessons::Lessons;
 use rayon::prelude::*;
 use std::sync::Arc;
 use trail::{NONE, Tracker, Trail, shifted};
@@ -53,7 +57,7 @@ const MERGED_PIXELS: f32 = 2.0;
 /// A gathering walk that comes to a merge by chance finds so many light vertices, not more: by then the noise is the walk's, and each
 /// costs time.
 const FEW: f64 = 3.0;
-/// The round before which techniques are chosen.
+/// The round before which techniques are chosen for the first time.
 const CHOICE: u32 = 3;
 /// Light paths that judge techniques, at most.
 const JUDGES: u32 = 8192;
@@ -86,12 +90,6 @@ pub struct Decisions {
     pub incident: Option<Arc<Incident>>,
 }
 
-/// Is guided emission on its way, by the part of light paths that were of use in a round and in the next? Where few find what is seen, as
-/// of a small sun over a pool, it gets on slowly at first, and more is to be gained than where many do.
-fn still_learns([before, now]: [f64; 2]) -> bool {
-    now > if now < 0.25 { 1.1 } else { 1.4 } * before
-}
-
 /// Part of its area that a merge has where a gathering walk comes by chance and would find `usual` light vertices.
 fn part_by_chance(usual: f64) -> f64 {
     (FEW / usual).min(1.0)
@@ -121,60 +119,40 @@ fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let mut pilot = Pilot::new(scene, settings, crop);
     // The first round only counts, since without a count there are no connections to learn from.
     let merge_radius = if t.merge { settings.merge_radius.unwrap_or_else(|| pilot.merge_radius()) } else { 0.0 };
-    let mut decisions = Decisions { merge_radius, ..nothing.clone() };
-    let last = (pilot.part(&pilot.plan(&decisions)) / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
-    let mut learner = Guide::new(&scene.lights);
-    let mut lessons = vec![];
-    // Part of the light paths that were of use, in the round before and in the last.
-    let mut of_use = [0.0f64; 2];
+    let mut so_far = Lessons::new(scene, Decisions { merge_radius, ..nothing.clone() });
+    let last = (pilot.part(&pilot.plan(&so_far.decisions)) / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
+    let halved = |round: u32| last >> (ROUNDS - 1).saturating_sub(round);
     for round in 0..ROUNDS + MORE_ROUNDS {
-        if round >= ROUNDS && !still_learns(of_use) {
+        if round >= ROUNDS && !so_far.still_learns() {
             break;
         }
-        let halvings = (ROUNDS - 1).saturating_sub(round);
-        let mut paths = (last >> halvings).max(JOB);
-        if round >= CHOICE {
-            // Where light paths are few, gathering walks are many: half of a pass is enough, whatever was chosen.
-            paths = paths.min((pilot.part(&pilot.plan(&decisions)) / 2) >> halvings).max(JOB);
-        }
         if round == CHOICE && settings.automatic {
-            let (settings, first_seen) = choice::choose(&pilot, &decisions, paths.min(JUDGES));
-            if !settings.techniques.shoots() {
-                decisions = nothing.clone();
-            }
-            decisions = Decisions { settings, first_seen, ..decisions };
+            let paths = so_far.paths(&pilot, halved(round));
+            so_far.choose(&pilot, paths, Chosen::ForRounds);
         }
-        let found = pilot.round(&decisions, (round, paths), goes);
-        let t = decisions.settings.techniques;
-        if t.connect {
-            decisions.vertices_per_path = found.vertices as f64 / f64::from(paths);
+        let paths = if round < CHOICE { halved(round).max(JOB) } else { so_far.paths(&pilot, halved(round)) };
+        so_far.learn(&mut pilot, (round, paths), goes);
+        if goes
+            && round == CHOICE
+            && !settings.guided_gathering
+            && !choice::goes(&pilot, &so_far.decisions, paths.min(JUDGES / 2))
+        {
+            goes = false;
+            so_far.decisions.incident = None;
         }
-        if t.merge {
-            decisions.by_chance = part_by_chance(found.crowds.usual().into()) as f32;
-            decisions.crowds = Arc::new(found.crowds);
-        }
-        if settings.guided && t.shoots() {
-            of_use = [of_use[1], found.starts.len() as f64 / f64::from(paths)];
-            found.starts.iter().for_each(|(start, value)| learner.learn(start, *value));
-            learner = learner.refined(&scene.lights);
-            decisions.guide = learner.clone();
-        }
-        if goes {
-            lessons.extend(found.incident);
-            if round >= CHOICE {
-                decisions.incident = Some(Arc::new(Incident::learned(&lessons)));
-            }
-            if round == CHOICE && !settings.guided_gathering && !choice::goes(&pilot, &decisions, paths.min(JUDGES / 2)) {
-                goes = false;
-                decisions.incident = None;
-            }
-        }
-        if !goes && !t.shoots() {
+        if !goes && !so_far.shoots() {
             break;
         }
     }
-    decisions.settings.guided_gathering = decisions.incident.is_some();
-    decisions
+    if settings.automatic {
+        // Once more, knowing what light paths find by now; then a round counts for what is chosen.
+        so_far.choose(&pilot, JUDGES, Chosen::ForRender);
+        if so_far.shoots() {
+            let paths = so_far.paths(&pilot, last / 4);
+            so_far.learn(&mut pilot, (ROUNDS + MORE_ROUNDS, paths), goes);
+        }
+    }
+    so_far.decided()
 }
 
 impl Decisions {
@@ -426,10 +404,15 @@ impl<'a> Pilot<'a> {
 
     /// A point of the `index`-th of `walks` pixels that are evenly spread in the order of rows.
     fn raster(&self, index: u32, walks: u32, random: &mut Random) -> Vec2 {
+        self.pixel(index, walks, random) + random.unit2()
+    }
+
+    /// The corner of that pixel.
+    fn pixel(&self, index: u32, walks: u32, random: &mut Random) -> Vec2 {
         let pixels = f64::from(self.crop[2]) * f64::from(self.crop[3]);
         let pixel = ((f64::from(index) + f64::from(random.unit())) / f64::from(walks) * pixels) as u32;
         let (x, y) = (pixel % self.crop[2], (pixel / self.crop[2]).min(self.crop[3] - 1));
-        Vec2::new((self.crop[0] + x) as f32, (self.crop[1] + y) as f32) + random.unit2()
+        Vec2::new((self.crop[0] + x) as f32, (self.crop[1] + y) as f32)
     }
 
     /// Cell of the coarse image around a point of the film, if it is in the crop window.
