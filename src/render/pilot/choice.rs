@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Light paths per pixel that are considered.
 const LIGHT_PATHS: [f64; 6] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Merging blurs, so it must win by this factor.
-const MERGE_MUST_WIN: f64 = 1.25;
+const MERGE_MUST_WIN: f64 = 1.1;
 /// Everything is on unless doing without wins by this factor: the estimate has noise itself.
 const LESS_MUST_WIN: f64 = 1.02;
 /// Without light paths a pilot learns nothing more, so that must win by this factor while there is something to learn.
