@@ -58,7 +58,9 @@ fn led_walks_find_the_light_behind_a_door() {
     let world = scene(AJAR);
     let (plain, led) = (picture(&world, false), picture(&world, true));
     // Relative to the square of the picture, as it is known better.
-    let noise = |p: &Picture| p.variance.iter().zip(&led.mean).map(|(v, m)| f64::from(v[1] / (m[1] * m[1]))).sum::<f64>();
+    let lit = |(_, m): &(&[f32; 3], &[f32; 3])| m[1] > 0.0;
+    let noise =
+        |p: &Picture| p.variance.iter().zip(&led.mean).filter(lit).map(|(v, m)| f64::from(v[1] / (m[1] * m[1]))).sum::<f64>();
     let (plain, led) = (noise(&plain), noise(&led));
     println!("variance led over not led: {:.3}", led / plain);
     assert!(led < 0.75 * plain, "{led} of {plain}");
