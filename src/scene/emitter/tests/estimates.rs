@@ -4,21 +4,26 @@
 use super::*;
 use crate::describe::{BitmapFilter, BitmapWrap, TextureDescription};
 use crate::math::warp;
+use crate::scene::geometry::Ray;
 
-/// One of each kind around the origin; the rectangle carries an image.
-fn everything() -> World {
-    let image = Image { width: 3, height: 2, channels: 1, data: vec![1.0, 0.0, 4.0, 0.5, 2.0, 0.0] };
-    let textured = TextureDescription::Bitmap {
+/// The first image, its texels as they are.
+fn textured() -> Option<AreaEmission> {
+    emission(TextureDescription::Bitmap {
         image: ImageId(0),
         filter: BitmapFilter::Nearest,
         wrap: BitmapWrap::Repeat,
         to_uv: Mat4::IDENTITY,
         place: Place::default(),
-    };
+    })
+}
+
+/// One of each kind around the origin; the rectangle carries an image.
+fn everything() -> World {
+    let image = Image { width: 3, height: 2, channels: 1, data: vec![1.0, 0.0, 4.0, 0.5, 2.0, 0.0] };
     let down = Mat4::from_translation(Vec3::new(0.0, 0.0, 3.0)) * Mat4::from_rotation_x(std::f32::consts::PI);
     let lamp = Form::Sphere { center: Vec3::new(1.5, 0.5, 1.0), radius: 0.4 };
     let shapes = vec![
-        (shape(Form::Rectangle, down), emission(textured)),
+        (shape(Form::Rectangle, down), textured()),
         (shape(lamp, Mat4::IDENTITY), constant([2.0, 1.0, 0.5])),
         (shape(Form::Disk, Mat4::from_translation(Vec3::new(-2.0, 0.0, 1.0)) * Mat4::from_rotation_y(1.3)), constant([1.5; 3])),
     ];
@@ -269,4 +274,23 @@ fn points_for_the_direct_view() {
         };
         assert!((sum - expected).abs() <= 0.03 * expected, "{}: {sum} for {expected}", info.kind);
     }
+}
+
+#[test]
+fn next_events_on_a_sphere_with_an_image_have_the_radiance_that_is_seen_there() {
+    let lamp = Form::Sphere { center: Vec3::new(0.3, 0.2, 2.0), radius: 0.8 };
+    let image = ImageDescription::Data(Arc::new(small_image()));
+    let world = World::with_images(vec![(shape(lamp, Mat4::from_rotation_y(0.4)), textured())], vec![], &[image]);
+    let mut random = Random::new(Family::Other, 31, 0, 0);
+    let (mut same, n) = (0, 2000);
+    for _ in 0..n {
+        let x = (random.unit2() - 0.5).extend(-0.5) * 3.0;
+        let next = world.lights.sample_next_event(&world.geometry, x, random.unit(), random.unit2()).unwrap();
+        let ray = Ray { o: x, d: next.w, t_max: f32::INFINITY };
+        let s = world.geometry.surface(&ray, &world.geometry.intersect(&ray).unwrap());
+        let point = EmitterPoint { emitter: EmitterId(0), y: s.p, y_error: s.p_error, n_g: s.n_g, uv: s.uv };
+        same += u32::from(world.lights.radiance(&point, -next.w) == next.radiance);
+    }
+    // Between two texels rounding decides.
+    assert!(same * 100 >= n * 99, "{same} of {n}");
 }
