@@ -51,11 +51,8 @@ impl Record for Sum {
 }
 
 impl ChainNoise {
-    /// Looks at pixels of `first_seen`, evenly spread; nothing where `plan` does not follow chains.
+    /// Looks at pixels of `first_seen`, evenly spread.
     pub(super) fn measured(pilot: &Pilot<'_>, plan: &Plan, first_seen: &FirstSeen, dark_squares: &[f64]) -> Self {
-        if !plan.settings.follows_chains() {
-            return Self::default();
-        }
         let all = first_seen.pixels().count();
         let pixels: Vec<Vec2> = first_seen.pixels().step_by(all.div_ceil(PIXELS).max(1)).collect();
         let (found, rays) = looked(pilot, plan, &pixels, (LOOKS, 0));
@@ -75,12 +72,10 @@ impl ChainNoise {
                 relative.is_finite().then_some(relative)
             })
             .collect();
-        let most = limit(relative.iter().copied(), MOST, CLIPPINGS);
-        let noise: f64 = relative.iter().map(|r| r.min(most)).sum();
         let samples = pixels.len() as f64 * f64::from(LOOKS);
         let times = |all: usize, some: usize| all as f64 / some.max(1) as f64;
         Self {
-            noise: noise * times(differ.len(), few.len()) * times(all, pixels.len()),
+            noise: in_all(&relative) * times(differ.len(), few.len()) * times(all, pixels.len()),
             part: all as f64 / f64::from(pilot.pixels().max(1)),
             branches: (rays as f64 / samples.max(1.0) - 1.0).max(0.0),
         }
@@ -95,6 +90,12 @@ impl ChainNoise {
     pub(super) fn cost(&self, samples: u32, eye: f64, branch: f64) -> f64 {
         f64::from(samples - 1) * self.part * (eye + branch * self.branches)
     }
+}
+
+/// The sum of what pixels say, none of which says too much.
+fn in_all(relative: &[f64]) -> f64 {
+    let most = limit(relative.iter().copied(), MOST, CLIPPINGS);
+    relative.iter().map(|r| r.min(most)).sum()
 }
 
 /// Mean and variance of what samples of chains of these pixels find, and the rays that they take; `first` numbers the first pixel.
@@ -116,4 +117,21 @@ fn looked(pilot: &Pilot<'_>, plan: &Plan, pixels: &[Vec2], (looks, first): (u32,
     };
     let (found, rays): (Vec<_>, Vec<u64>) = pixels.par_iter().enumerate().map(look).unzip();
     (found, rays.iter().sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_all;
+
+    #[test]
+    fn one_lucky_pixel_does_not_decide_and_many_do() {
+        let with = |lucky| {
+            let mut relative = vec![1.0; 300];
+            relative.extend(vec![1e5; lucky]);
+            in_all(&relative)
+        };
+        assert_eq!(with(0), 300.0);
+        assert!((with(1) - 400.0).abs() < 1.0, "{}", with(1));
+        assert_eq!(with(4), 300.0 + 4e5);
+    }
 }

@@ -158,13 +158,11 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32, chose
     let dark_squares = pilot.dark_squares();
     let mixture = Mixture::of(&plan, pilot.pixels());
     let follows = pilot.settings.follows_chains();
-    let look = || FirstSeen::looked_at(pilot.scene, pilot.crop, pilot.settings.seed);
-    let first_seen = if follows && decisions.first_seen.is_unknown() { Arc::new(look()) } else { decisions.first_seen.clone() };
-    let chains = match chosen {
-        // No round has samples of chains alone.
-        Chosen::ForRounds => ChainNoise::default(),
-        Chosen::ForRender => ChainNoise::measured(pilot, &plan, &first_seen, &dark_squares),
-    };
+    // No round has samples of chains alone, so none needs to know where they would be.
+    let looks = follows && chosen == Chosen::ForRender;
+    let first_seen =
+        if looks { FirstSeen::looked_at(pilot.scene, pilot.crop, pilot.settings.seed) } else { FirstSeen::default() };
+    let chains = if looks { ChainNoise::measured(pilot, &plan, &first_seen, &dark_squares) } else { ChainNoise::default() };
     if follows {
         plan.settings.faint = LEAST;
     }
@@ -190,5 +188,5 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32, chose
         chain_samples,
         ..c.settings(pilot.settings, pixels)
     };
-    (best.map_or_else(|| pilot.settings.clone(), with), first_seen)
+    (best.map_or_else(|| pilot.settings.clone(), with), Arc::new(first_seen))
 }

@@ -60,6 +60,17 @@ pub(super) struct Evidence {
     pub(super) chain: Option<f32>,
 }
 
+#[cfg(test)]
+impl Evidence {
+    /// Of a path that only this join finds.
+    pub(super) fn of(technique: Technique, square: f64) -> Self {
+        let mut shares = [0.0; Technique::ALL.len()];
+        shares[technique as usize] = 1.0;
+        let (value, walk, by_chance, crowd) = (0.0, 0, 0.0, 0.0);
+        Self { square, value, technique, walk, shares, by_chance, crowd, steady: false, unguided: 1.0, chain: None }
+    }
+}
+
 /// Values of splats by pixel position, in the order in which they are witnessed.
 struct Splats(Vec<Vec2>);
 impl Record for Splats {
@@ -166,6 +177,7 @@ impl Found {
 }
 
 /// All that a pilot knows to judge by.
+#[derive(Default)]
 pub(super) struct Findings {
     /// Paths, none of which says too much.
     pub(super) evidence: Vec<Evidence>,
@@ -210,8 +222,7 @@ impl Findings {
 
     #[cfg(test)]
     pub(super) fn of(evidence: Vec<Evidence>, sets: Vec<Evidence>) -> Self {
-        let nothing = (Counts::default(), Merges::default(), BranchRays::default());
-        Self { evidence, sets, eye: nothing.0, light: nothing.0, merges: nothing.1, branches: nothing.2, walks: 0 }
+        Self { evidence, sets, ..Self::default() }
     }
 
     /// What comes of following branches down to this or that share.
@@ -399,18 +410,7 @@ mod tests {
 
     #[test]
     fn luck_does_not_decide() {
-        let of = |square| Evidence {
-            square,
-            value: 0.0,
-            technique: Technique::Hit,
-            walk: 0,
-            shares: [1.0, 0.0, 0.0, 0.0, 0.0],
-            by_chance: 0.0,
-            crowd: 0.0,
-            unguided: 1.0,
-            steady: false,
-            chain: None,
-        };
+        let of = |square| Evidence::of(Technique::Hit, square);
         let mut evidence: Vec<Evidence> = (0..1000).map(|_| of(1.0)).collect();
         clip(&mut evidence);
         assert!(evidence.iter().all(|e| e.square == 1.0));

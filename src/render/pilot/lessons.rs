@@ -49,11 +49,14 @@ impl<'a> Lessons<'a> {
 
     /// What is decided in the end: nothing about light paths where none are shot.
     pub(super) fn decided(self) -> Decisions {
-        let shoots = self.shoots();
-        let Decisions { mut settings, first_seen, incident, .. } = self.decisions.clone();
-        settings.guided_gathering = incident.is_some();
-        let kept = if shoots { self.decisions } else { Decisions::nothing(&self.asked) };
-        Decisions { settings, first_seen, incident, ..kept }
+        let mut decided = if self.shoots() {
+            self.decisions
+        } else {
+            let Decisions { settings, first_seen, incident, .. } = self.decisions;
+            Decisions { settings, first_seen, incident, ..Decisions::nothing(&self.asked) }
+        };
+        decided.settings.guided_gathering = decided.incident.is_some();
+        decided
     }
 
     /// Runs a round and learns from it: where light paths should start, and where gathering walks go if they are to go anywhere.

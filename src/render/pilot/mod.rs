@@ -2,7 +2,7 @@
 //! paths should start, and how far apart vertices may be to be merged.
 //!
 //! The pilot is a small bidirectional render of the same measurement: some of the pixels gather, a
-//! proportional number of light paths is shot, in rounds that double, and some more where it still learns fast. After each round the guide of
+//! proportional number of light paths is shot, in rounds that double, and some more while it still learns. After each round the guide of
 //! emission is refined by what each light path added to the noise of the image, relative to the image
 //! (as relMSE counts it): the squares of its weighted splats and connections. What the pilot decides
 //! enters weights and densities and must not depend on the samples that are weighted with it; it
@@ -119,7 +119,7 @@ fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     let mut pilot = Pilot::new(scene, settings, crop);
     // The first round only counts, since without a count there are no connections to learn from.
     let merge_radius = if t.merge { settings.merge_radius.unwrap_or_else(|| pilot.merge_radius()) } else { 0.0 };
-    let mut so_far = Lessons::new(scene, Decisions { merge_radius, ..nothing.clone() });
+    let mut so_far = Lessons::new(scene, Decisions { merge_radius, ..nothing });
     let last = (pilot.part(&pilot.plan(&so_far.decisions)) / 2).clamp(*LAST_ROUND.start(), *LAST_ROUND.end());
     let halved = |round: u32| last >> (ROUNDS - 1).saturating_sub(round);
     for round in 0..ROUNDS + MORE_ROUNDS {
@@ -132,11 +132,8 @@ fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
         }
         let paths = if round < CHOICE { halved(round).max(JOB) } else { so_far.paths(&pilot, halved(round)) };
         so_far.learn(&mut pilot, (round, paths), goes);
-        if goes
-            && round == CHOICE
-            && !settings.guided_gathering
-            && !choice::goes(&pilot, &so_far.decisions, paths.min(JUDGES / 2))
-        {
+        let decides = round == CHOICE && goes && !settings.guided_gathering;
+        if decides && !choice::goes(&pilot, &so_far.decisions, paths.min(JUDGES / 2)) {
             goes = false;
             so_far.decisions.incident = None;
         }

@@ -107,22 +107,26 @@ impl Candidate {
                 Technique::Merge => merges(e),
             })
         };
-        let rho = |e: &Evidence| e.shares.iter().zip(numbers(e)).map(|(r, n)| r * n).sum::<f64>().max(LOST);
+        let rho_of = |e: &Evidence, numbers: [f64; Technique::ALL.len()]| {
+            e.shares.iter().zip(numbers).map(|(r, n)| r * n).sum::<f64>().max(LOST)
+        };
         let mut pairs = Pairs::default();
         for e in self.noisy(&found.sets) {
-            let value = e.value / rho(e);
-            if e.technique.gathers_alone() && numbers(e)[e.technique as usize] > 0.0 && value <= REGULAR {
+            let numbers = numbers(e);
+            let value = e.value / rho_of(e, numbers);
+            if e.technique.gathers_alone() && numbers[e.technique as usize] > 0.0 && value <= REGULAR {
                 pairs.add(e.walk, value);
             }
         }
         // The second moment of all, and of what gathering walks find each for itself and regularly.
         let (mut all, mut regular) = (0.0, 0.0);
         for e in self.noisy(&found.evidence) {
-            let rho = rho(e);
+            let numbers = numbers(e);
+            let rho = rho_of(e, numbers);
             all += e.square / rho;
             if e.value <= REGULAR * rho {
                 let alone = Technique::ALL.into_iter().filter(|t| t.gathers_alone()).map(|t| t as usize);
-                regular += e.square / rho * alone.map(|t| e.shares[t] * numbers(e)[t]).sum::<f64>() / rho;
+                regular += e.square / rho * alone.map(|t| e.shares[t] * numbers[t]).sum::<f64>() / rho;
             }
         }
         (all - regular * (1.0 - pairs.part_of_noise())).max(LEAST_VARIANCE * all)
@@ -141,28 +145,12 @@ mod tests {
     use crate::math::Random;
     use crate::math::random::Family;
 
-    fn found(technique: Technique, square: f64, value: f64, walk: u32) -> Evidence {
-        let shares = Technique::ALL.map(|t| if t == technique { 1.0 } else { 0.0 });
-        let chance = (0.0, 0.0);
-        Evidence {
-            square,
-            value,
-            technique,
-            walk,
-            shares,
-            by_chance: chance.0,
-            crowd: chance.1,
-            steady: false,
-            unguided: 1.0,
-            chain: None,
-        }
-    }
-
     #[test]
     fn moments_of_what_never_varies_do_not_count() {
         let mixture = Mixture { light_paths: 1.0, usual: 1.0, by_chance: 1.0, shrunk: 0.5 };
         let of = |light_paths, next_event, merge| Candidate { light_paths, next_event, connect: false, merge };
-        let many = |n, technique, square, value| (0..n).map(move |walk| found(technique, square, value, walk));
+        let many =
+            |n, technique, square, value| (0..n).map(move |walk| Evidence { value, walk, ..Evidence::of(technique, square) });
         // 1000 shadow rays that find all the same, and 500 of luck.
         let steady = |value| many(1000, Technique::NextEvent, 1.0, value).chain(many(100, Technique::Splat, 5.0, 5.0)).collect();
         let sets = |value| many(20 * SET, Technique::NextEvent, 1.0, value).collect();
