@@ -24,8 +24,10 @@ pub(super) struct Builder<'a> {
     images: &'a [ImageDescription],
     pub textures: Textures,
     pub problems: Problems,
-    /// Models built so far; `Some(None)` where one is wrong.
-    leaves: Vec<Option<Option<Model>>>,
+    /// Something of the material at hand is a texture.
+    pub textured: bool,
+    /// Models built so far, and whether something of them is a texture; `Some(None)` where one is wrong.
+    leaves: Vec<Option<Option<(Model, bool)>>>,
     /// Models that are being flattened, outermost first.
     path: Vec<BsdfId>,
     /// Elements of the present tree seen so far.
@@ -50,6 +52,7 @@ impl<'a> Builder<'a> {
             path: Vec::new(),
             visited: 0,
             coats: Vec::new(),
+            textured: false,
         }
     }
 
@@ -131,9 +134,13 @@ impl<'a> Builder<'a> {
     fn leaf(&mut self, id: BsdfId) -> Option<Model> {
         let i = id.0 as usize;
         if self.leaves[i].is_none() {
-            self.leaves[i] = Some(self.build_leaf(&self.bsdfs[i]));
+            let others = std::mem::take(&mut self.textured);
+            self.leaves[i] = Some(self.build_leaf(&self.bsdfs[i]).map(|model| (model, self.textured)));
+            self.textured = others;
         }
-        self.leaves[i].clone().flatten()
+        let (model, textured) = self.leaves[i].clone().flatten()?;
+        self.textured |= textured;
+        Some(model)
     }
 
     fn build_leaf(&mut self, bsdf: &BsdfDescription) -> Option<Model> {
@@ -229,6 +236,7 @@ impl<'a> Builder<'a> {
     /// A texture that must not be negative where it is constant.
     fn texture(&mut self, texture: &TextureDescription, name: &str, place: Place) -> TextureSlot {
         let slot = self.textures.add(texture, self.images, &mut self.problems);
+        self.textured |= !slot.is_constant();
         let least = self.textures.min(slot);
         if !(least.is_finite() && self.textures.max(slot).is_finite()) {
             self.problems.error(place, format!("`{name}` is not finite"));

@@ -123,6 +123,7 @@ pub(super) enum Side {
 struct Summary {
     lobes: Lobes,
     anisotropic: bool,
+    textured: bool,
     breadth: Breadth,
     guided: bool,
     albedo_bound: Spectrum,
@@ -145,10 +146,11 @@ impl Materials {
         let mut materials = Self { sides: Vec::new(), summaries: Vec::new(), textures: Textures::default() };
         for id in 0..bsdfs.len() as u32 {
             let [front, back] = [true, false].map(|front| builder.side(BsdfId(id), front));
-            materials.push(front, back, &builder.textures);
+            let textured = std::mem::take(&mut builder.textured);
+            materials.push(front, back, textured, &builder.textures);
         }
         let grey = diffuse::Model { reflectance: TextureSlot::Constant(Spectrum::grey(0.5)) };
-        materials.push(Side::Single(grey.into()), Side::Black, &builder.textures);
+        materials.push(Side::Single(grey.into()), Side::Black, false, &builder.textures);
         if builder.problems.has_errors() {
             return Err(builder.problems);
         }
@@ -156,11 +158,12 @@ impl Materials {
         Ok(materials)
     }
 
-    fn push(&mut self, front: Side, back: Side, textures: &Textures) {
+    fn push(&mut self, front: Side, back: Side, textured: bool, textures: &Textures) {
         let models = || front.models().chain(back.models());
         self.summaries.push(Summary {
             lobes: models().fold(Lobes::default(), |all, m| all.union(m.lobes())),
             anisotropic: models().any(Model::is_anisotropic),
+            textured,
             breadth: models().map(|m| Breadth::of(m, textures)).max().unwrap_or(Breadth::Sharp),
             guided: models().any(|m| is_wide(m, textures)) && !models().any(|m| m.lobes().glossy_refraction),
             albedo_bound: models().fold(Spectrum::BLACK, |most, m| most.lane_max(m.albedo_bound(textures))),
@@ -198,6 +201,12 @@ impl Materials {
     #[inline]
     pub fn needs_tangent(&self, id: MaterialId) -> bool {
         self.summaries[id.0 as usize].anisotropic
+    }
+
+    /// Something of it is a texture: [`Self::resolve`] looks at texture coordinates.
+    #[inline]
+    pub fn needs_uv(&self, id: MaterialId) -> bool {
+        self.summaries[id.0 as usize].textured
     }
 
     /// Into how many directions it scatters at most.

@@ -11,6 +11,7 @@ use super::sensor::Sensor;
 use super::{EmitterId, MaterialId, Scene};
 use crate::describe::{
     AreaEmission, ImageDescription, MeshDescription, Place, Problems, SceneDescription, ShapeDescription, ShapeModel,
+    TextureDescription,
 };
 use crate::local::Materials;
 use glam::Vec3;
@@ -146,6 +147,7 @@ impl<'a> Shapes<'a> {
                     continue;
                 }
                 input.emitter = EmitterId(shapes.areas.len() as u32);
+                input.needs_uv |= !matches!(emission.radiance, TextureDescription::Constant(_));
                 shapes.areas.push((shapes.top.len() as u32, emission));
             }
             shapes.top.push(input);
@@ -187,6 +189,7 @@ fn input(
         material,
         emitter: EmitterId::NONE,
         needs_tangent: materials.is_some_and(|m| m.needs_tangent(material)),
+        needs_uv: materials.is_none_or(|m| m.needs_uv(material)),
         place: shape.place,
     })
 }

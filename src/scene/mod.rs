@@ -88,7 +88,7 @@ pub struct Surface {
     pub n_s: Vec3,
     /// Direction of growing u (not normalised; may be zero), for anisotropic models.
     pub dp_du: Vec3,
-    /// Texture coordinates.
+    /// Texture coordinates; anything where neither material nor emitter has a texture.
     pub uv: Vec2,
     /// Index of the shape in the built geometry.
     pub shape: u32,

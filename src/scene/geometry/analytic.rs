@@ -4,6 +4,7 @@
 //! far below an ulp of an f32 coordinate. That is why an origin rounded to f32 and moved off such a
 //! shape by an ulp or two never meets it again, and a sphere of 1e-3 at distance 100 is round.
 
+use super::bake::Shape;
 use super::cylinder::Cylinder;
 use super::disk::Disk;
 use super::ray::{Aabb, Ray};
@@ -37,10 +38,14 @@ impl Analytic {
         each!(self, s => s.intersect(o.as_dvec3(), d.as_dvec3(), f64::from(t_max))).map(|t| t as f32).filter(|t| *t > 0.0)
     }
 
-    /// The point of the shape that the ray met at `t`.
-    pub(super) fn surface(&self, ray: &Ray, t: f32, tangent: bool) -> Local {
+    /// The point of the shape that the ray met at `t`, with what `shape` needs.
+    pub(super) fn surface(&self, ray: &Ray, t: f32, shape: &Shape) -> Local {
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-        each!(self, s => s.surface(o, d, f64::from(t), tangent))
+        match self {
+            Self::Sphere(s) => s.surface(o, d, f64::from(t), shape.needs_tangent, shape.needs_uv),
+            Self::Disk(s) => s.surface(o, d, shape.needs_tangent, shape.needs_uv),
+            Self::Cylinder(s) => s.surface(o, d, f64::from(t), shape.needs_tangent),
+        }
     }
 
     /// Box, rounded outwards.

@@ -8,6 +8,7 @@ use super::cylinder::Cylinder;
 use super::disk::Disk;
 use super::input::{Form, ShapeInput};
 use super::meshes;
+use super::parallelogram::Parallelogram;
 use super::ray::NONE;
 use super::sphere::Sphere;
 use crate::describe::{Mesh, Place, Problems};
@@ -41,6 +42,7 @@ pub(super) struct Shape {
     pub(super) has_normals: bool,
     pub(super) has_uvs: bool,
     pub(super) needs_tangent: bool,
+    pub(super) needs_uv: bool,
 }
 
 /// How points of a shape are drawn uniformly by area.
@@ -50,9 +52,8 @@ pub(super) enum Sampler {
     Never,
     /// Triangles from primitive `first` on, chosen by the running sum of areas (normalised).
     Triangles { first: u32, cdf: Vec<f64> },
-    /// The rectangle of the two triangles from primitive `first` on, as one; `v` are the vertices of the
-    /// first, so that a point of one of many lamps waits for memory once less.
-    Parallelogram { first: u32, v: [u32; 3] },
+    /// The two triangles from primitive `first` on, as one.
+    Parallelogram { first: u32, plane: Parallelogram },
     /// An analytic shape.
     Analytic { index: u32 },
 }
@@ -81,6 +82,7 @@ impl Baked {
             has_normals: false,
             has_uvs: false,
             needs_tangent: input.needs_tangent,
+            needs_uv: input.needs_uv,
         });
         self.samplers.push((Sampler::Never, 0.0));
         if groups.is_none() && input.emitter != EmitterId::NONE {
@@ -90,12 +92,7 @@ impl Baked {
         match &input.form {
             Form::Mesh { mesh, face_normals } => self.mesh(index, mesh, &m, *face_normals, input.place),
             Form::Cube => self.mesh(index, &meshes::cube(), &m, false, input.place),
-            Form::Rectangle => {
-                self.mesh(index, &meshes::rectangle(), &m, false, input.place);
-                if let (Sampler::Triangles { first, .. }, area) = self.samplers[index as usize] {
-                    self.samplers[index as usize] = (Sampler::Parallelogram { first, v: self.prims[first as usize].v }, area);
-                }
-            }
+            Form::Rectangle => self.mesh(index, &meshes::rectangle(), &m, false, input.place),
             Form::Disk => self.analytic(index, Analytic::Disk(Disk::new(m, input.flip_normals))),
             Form::Sphere { center, radius } => self.sphere(index, center.as_dvec3(), f64::from(*radius), &m, input),
             Form::Cylinder { p0, p1, radius } => {
@@ -226,6 +223,11 @@ impl Baked {
         let own = &mut self.shapes[shape as usize];
         own.has_normals = has_normals;
         own.has_uvs = !mesh.uvs.is_empty();
+        if let [one, two] = self.prims[first as usize..]
+            && let Some(plane) = Parallelogram::of([one, two].map(|p| p.v.map(|v| &self.vertices[v as usize])), own)
+        {
+            self.samplers[shape as usize] = (Sampler::Parallelogram { first, plane }, area);
+        }
     }
 
     fn check_mesh(&mut self, mesh: &Mesh, place: Place) -> bool {

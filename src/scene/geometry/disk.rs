@@ -3,7 +3,7 @@
 use super::analytic::turns;
 use super::surface::{Local, rounded_error};
 use crate::math::warp::disk_concentric;
-use glam::{DAffine3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
 /// A disk in the coordinates of its tree.
@@ -35,7 +35,7 @@ impl Disk {
         (t, o.truncate() + d.truncate() * t)
     }
 
-    pub(super) fn surface(&self, o: DVec3, d: DVec3, _: f64, tangent: bool) -> Local {
+    pub(super) fn surface(&self, o: DVec3, d: DVec3, tangent: bool, with_uv: bool) -> Local {
         let (_, q) = self.meet(o, d);
         let p = self.to_world.transform_point3(q.extend(0.0)).as_vec3();
         let n = self.n.as_vec3();
@@ -45,7 +45,13 @@ impl Disk {
         } else {
             Vec3::ZERO
         };
-        Local { p, p_error: rounded_error(p), n_g: n, n_s: n, dp_du, uv: Vec2::new(q.length() as f32, turns(q.y, q.x)) }
+        let uv = if with_uv { uv(q) } else { Vec2::ZERO };
+        Local { p, p_error: rounded_error(p), n_g: n, n_s: n, dp_du, uv }
+    }
+
+    /// A point of the disk in its own coordinates.
+    pub(super) fn place(&self, p: DVec3) -> DVec2 {
+        self.to_own.transform_point3(p).truncate()
     }
 
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {
@@ -73,7 +79,11 @@ impl Disk {
 
     pub(super) fn sample_area(&self, u: Vec2) -> (DVec3, DVec3, Vec2) {
         let q = disk_concentric(u).as_dvec2();
-        let uv = Vec2::new(q.length() as f32, turns(q.y, q.x));
-        (self.to_world.transform_point3(q.extend(0.0)), self.n, uv)
+        (self.to_world.transform_point3(q.extend(0.0)), self.n, uv(q))
     }
+}
+
+#[inline]
+fn uv(q: DVec2) -> Vec2 {
+    Vec2::new(q.length() as f32, turns(q.y, q.x))
 }

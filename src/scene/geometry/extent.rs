@@ -4,7 +4,7 @@ use super::Geometry;
 use super::analytic::Analytic;
 use super::bake::{Prim, Sampler};
 use super::ray::{Aabb, NONE};
-use super::surface::normal_of;
+use super::surface::{DOUBTFUL, normal_of};
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
@@ -26,8 +26,6 @@ pub struct Extent {
 
 /// Mean projected area of a closed convex shape, in parts of its area (Cauchy).
 const CLOSED: f32 = 0.25;
-/// Below this cosine between face and vertex normal, rounding may decide the side.
-const DOUBTFUL: f32 = 1e-3;
 
 impl Geometry {
     /// Bounds of a shape of the scene; `None` for one without area and for instances.

@@ -20,6 +20,8 @@ pub struct ShapeInput {
     pub emitter: EmitterId,
     /// Its material asks for ∂p/∂u; otherwise `Surface::dp_du` is zero.
     pub needs_tangent: bool,
+    /// Its material or its emitter asks for texture coordinates; otherwise `Surface::uv` may be anything.
+    pub needs_uv: bool,
     /// Where it is described.
     pub place: Place,
 }
@@ -34,6 +36,7 @@ impl ShapeInput {
             material: MaterialId(0),
             emitter: EmitterId::NONE,
             needs_tangent: false,
+            needs_uv: true,
             place: Place::default(),
         }
     }

@@ -53,6 +53,11 @@ impl Instance {
         Ray { o: self.to_group.transform_point3(ray.o), d: self.to_group.transform_vector3(ray.d), t_max }
     }
 
+    /// A point of the world in the group's coordinates.
+    pub(super) fn point_to_group(&self, p: Vec3) -> Vec3 {
+        self.to_group.transform_point3(p)
+    }
+
     /// Bound of the rounding error, in the world, of mapping `p` into the group and of an error
     /// `inner` made there.
     fn error(&self, p: Vec3, inner: f32) -> f32 {

@@ -20,6 +20,7 @@ mod lanes;
 mod lanes_avx2;
 mod meshes;
 mod pages;
+mod parallelogram;
 mod pieces;
 mod ray;
 mod sample;
@@ -193,7 +194,7 @@ impl Geometry {
             triangle::surface(prim.v.map(|i| &self.vertices[i as usize]), shape, hit.u, hit.v)
         } else {
             let ray = instance.map_or(*ray, |i| i.ray_to_group(ray, ray.t_max));
-            self.tree.analytic[prim.v[1] as usize].0.surface(&ray, hit.t, shape.needs_tangent)
+            self.tree.analytic[prim.v[1] as usize].0.surface(&ray, hit.t, shape)
         };
         instance.map_or(local, |i| i.point_to_world(&local)).on(prim.shape, shape)
     }

@@ -14,7 +14,7 @@ use super::{Geometry, triangle};
 use crate::math::warp::disk_concentric_inverse;
 use crate::scene::{EmitterId, MaterialId, Surface};
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use std::f64::consts::{FRAC_2_PI, FRAC_PI_4, TAU};
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
 
 /// A primitive where it is placed.
 #[derive(Clone, Copy, Debug)]
@@ -145,16 +145,13 @@ impl Geometry {
         if prim.v[0] != NONE {
             return Vec2::new(hit.u, hit.v);
         }
-        let uv = surface.uv.as_dvec2();
+        let p = match hit.instance {
+            NONE => surface.p,
+            i => self.tree.instances[i as usize].point_to_group(surface.p),
+        };
         match &self.tree.analytic[prim.v[1] as usize].0 {
-            Analytic::Sphere(_) => {
-                let ((sin_p, cos_p), (sin_t, cos_t)) = ((uv.x * TAU).sin_cos(), (uv.y * 0.5 * TAU).sin_cos());
-                octahedral_inverse(DVec3::new(sin_t * cos_p, sin_t * sin_p, cos_t)).as_vec2()
-            }
-            Analytic::Disk(_) => {
-                let (sin, cos) = (uv.y * TAU).sin_cos();
-                disk_concentric_inverse((DVec2::new(cos, sin) * uv.x).as_vec2())
-            }
+            Analytic::Sphere(sphere) => octahedral_inverse(sphere.direction(p.as_dvec3())).as_vec2(),
+            Analytic::Disk(disk) => disk_concentric_inverse(disk.place(p.as_dvec3()).as_vec2()),
             Analytic::Cylinder(_) => surface.uv,
         }
     }

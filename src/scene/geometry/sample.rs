@@ -6,7 +6,7 @@
 use super::analytic::Analytic;
 use super::bake::Sampler;
 use super::sphere::Sphere;
-use super::surface::{normal_of, rounded_error, triangle_error};
+use super::surface::{normal_of, rounded_error, triangle_error, triangle_slack};
 use super::{Geometry, triangle};
 use crate::math::warp::{ONE_MINUS_EPSILON, disk_concentric, triangle_uniform};
 use glam::{DVec3, Vec2, Vec3};
@@ -44,8 +44,7 @@ impl Geometry {
                 let b = triangle_uniform(Vec2::new(rest, u.y));
                 self.triangle_point(shape, self.tree.prims[(first + i as u32) as usize].v, b.x, b.y, p_a)
             }
-            // The first triangle's edges are a → b and a → c = b + (d − a).
-            Sampler::Parallelogram { v, .. } => self.triangle_point(shape, *v, u.x - u.y, u.y, p_a),
+            Sampler::Parallelogram { plane, .. } => plane.at(u, p_a),
             Sampler::Analytic { index } => point(self.tree.analytic[*index as usize].0.sample_area(u), p_a),
             Sampler::Never => ShapePoint { p: Vec3::ZERO, p_error: 0.0, n_g: Vec3::Z, uv: Vec2::ZERO, p_a: 0.0 },
         }
@@ -60,7 +59,7 @@ impl Geometry {
         let (n_g, _) = triangle::orient([a, b, c], shape, face, [w, u, v]);
         let p = a.p + (e1 * u + e2 * v);
         let uv = if shape.has_uvs { a.uv * w + b.uv * u + c.uv * v } else { Vec2::new(u, v) };
-        ShapePoint { p, p_error: triangle_error(p, e1, e2, double_area), n_g, uv, p_a }
+        ShapePoint { p, p_error: triangle_error(p, triangle_slack(e1, e2, double_area)), n_g, uv, p_a }
     }
 
     /// A point of a shape for a next event at `x`: spheres are sampled uniformly in solid angle where

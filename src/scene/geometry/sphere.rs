@@ -10,6 +10,10 @@ use crate::math::warp::{sin_cos_turn, sphere_uniform};
 use glam::{DMat3, DVec3, Vec2, Vec3};
 use std::f64::consts::PI;
 
+/// Up to so many radii away a rounded t is as good as the root: brought back onto the sphere, the point is off by a millionth
+/// of the radius at most, along it.
+const NEAR: f64 = 16.0;
+
 /// A sphere in the coordinates of its tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sphere {
@@ -43,30 +47,39 @@ impl Sphere {
         roots(dd, qd, nearest.dot(nearest), self.radius)
     }
 
-    pub(super) fn surface(&self, o: DVec3, d: DVec3, t: f64, tangent: bool) -> Local {
-        // The exact root beside the rounded t.
-        let t = match self.roots(o, d) {
-            Some((t0, t1)) => {
-                if (t - t0).abs() < (t - t1).abs() {
-                    t0
-                } else {
-                    t1
-                }
-            }
-            None => t,
-        };
+    pub(super) fn surface(&self, o: DVec3, d: DVec3, t: f64, tangent: bool, with_uv: bool) -> Local {
+        let t = if t * t * d.length_squared() < NEAR * NEAR * self.radius * self.radius { t } else { self.exact_root(o, d, t) };
         let out = (o + d * t - self.center).normalize();
         let p = (self.center + out * self.radius).as_vec3();
-        let own = self.own(out);
         let n = (out * self.side).as_vec3();
-        let dp_du = if tangent { (self.linear * DVec3::new(-own.y, own.x, 0.0) * (2.0 * PI)).as_vec3() } else { Vec3::ZERO };
-        Local { p, p_error: rounded_error(p), n_g: n, n_s: n, dp_du, uv: uv(own) }
+        let dp_du = if tangent {
+            let own = self.own(out);
+            (self.linear * DVec3::new(-own.y, own.x, 0.0) * (2.0 * PI)).as_vec3()
+        } else {
+            Vec3::ZERO
+        };
+        let uv = if with_uv { uv(self.own(out)) } else { Vec2::ZERO };
+        Local { p, p_error: rounded_error(p), n_g: n, n_s: n, dp_du, uv }
+    }
+
+    /// The root beside the rounded `t`.
+    fn exact_root(&self, o: DVec3, d: DVec3, t: f64) -> f64 {
+        match self.roots(o, d) {
+            Some((t0, t1)) if (t - t0).abs() < (t - t1).abs() => t0,
+            Some((_, t1)) => t1,
+            None => t,
+        }
     }
 
     /// Unit vector from the centre in the sphere's own coordinates.
     #[inline]
     fn own(&self, out: DVec3) -> DVec3 {
         self.linear.transpose() * out / self.radius
+    }
+
+    /// Unit vector from the centre to a point of the sphere, in the sphere's own coordinates.
+    pub(super) fn direction(&self, p: DVec3) -> DVec3 {
+        self.own((p - self.center).normalize())
     }
 
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {

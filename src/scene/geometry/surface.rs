@@ -14,6 +14,9 @@ use glam::{DVec3, Vec2, Vec3};
 /// Unit roundoff of single precision, 2⁻²⁴.
 pub(super) const UNIT: f32 = f32::EPSILON / 2.0;
 
+/// Below this cosine between face and vertex normal, rounding may decide the side.
+pub(super) const DOUBTFUL: f32 = 1e-3;
+
 /// A surface point in the coordinates of its tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Local {
@@ -58,7 +61,14 @@ pub fn offset_origin(p: Vec3, p_error: f32, n_g: Vec3, d: Vec3) -> Vec3 {
     p + n_g * distance.copysign(d.dot(n_g))
 }
 
-/// Bound for the point of a triangle with edges `e1`, `e2` from its first vertex.
+/// Bound for the point `p` of a triangle with this [`triangle_slack`].
+#[inline(always)]
+pub(super) fn triangle_error(p: Vec3, slack: f32) -> f32 {
+    UNIT * (p.abs().max_element() + slack)
+}
+
+/// What all points of a triangle with edges `e1`, `e2` from its first vertex have in common of that bound, in units of
+/// roundoff.
 ///
 /// The point `a + u·e1 + v·e2`: half an ulp of each coordinate and some roundings in the edges.
 /// The test: the ray parameter is Σ z_i·area_i / Σ area_i over the corners as seen along the ray,
@@ -67,11 +77,11 @@ pub fn offset_origin(p: Vec3, p_error: f32, n_g: Vec3, d: Vec3) -> Vec3 {
 /// million rays, leaving slivers, bumpy meshes and wide floors at all scales and in grazing
 /// directions, met nothing.
 #[inline(always)]
-pub(super) fn triangle_error(p: Vec3, e1: Vec3, e2: Vec3, double_area: f32) -> f32 {
+pub(super) fn triangle_slack(e1: Vec3, e2: Vec3, double_area: f32) -> f32 {
     let (a, b) = (e1.length_squared(), e2.length_squared());
     let longest = a.max(b).sqrt();
     let skew = (a * b).sqrt() / double_area;
-    UNIT * (p.abs().max_element() + longest * (3.0 + 1.5 * skew))
+    longest * (3.0 + 1.5 * skew)
 }
 
 /// Bound for a point that was computed in double precision and rounded once.

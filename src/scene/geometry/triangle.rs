@@ -1,7 +1,7 @@
 //! Surface points of triangles: p = a + u·(b − a) + v·(c − a), never o + t·d.
 
 use super::bake::{Shape, Vertex};
-use super::surface::{Local, normal_of, triangle_error};
+use super::surface::{Local, normal_of, triangle_error, triangle_slack};
 use crate::math::Frame;
 use glam::{Vec2, Vec3};
 
@@ -15,7 +15,7 @@ pub(super) fn surface([a, b, c]: [&Vertex; 3], shape: &Shape, u: f32, v: f32) ->
     let (n_g, n_s) = orient([a, b, c], shape, face, [w, u, v]);
     let uv = if shape.has_uvs { a.uv * w + b.uv * u + c.uv * v } else { Vec2::new(u, v) };
     let dp_du = if shape.needs_tangent { tangent([a, b, c], shape, n_g) } else { Vec3::ZERO };
-    Local { p, p_error: triangle_error(p, e1, e2, double_area), n_g, n_s, dp_du, uv }
+    Local { p, p_error: triangle_error(p, triangle_slack(e1, e2, double_area)), n_g, n_s, dp_du, uv }
 }
 
 /// Geometric and shading normal. Vertex normals decide the side (they are flipped already);
