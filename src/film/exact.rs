@@ -2,7 +2,7 @@
 //!
 //! With `2^e` near the largest usual pixel value, a contribution 2⁴⁰ times smaller than that is
 //! still held to every bit of its f32, and one 2³¹ times larger still fits. Rounding a float to the
-//! grid takes apart its bits and shifts; additions are modular, hence associative even where an
+//! grid scales it in f64, where the 24 bits of an f32 stay exact; additions are modular, hence associative even where an
 //! intermediate sum would leave the range. 2³² contributions at the upper limit still fit.
 
 /// Fraction bits below `2^e`.
@@ -75,22 +75,17 @@ impl Exact {
     /// The same, cut to `2^limit − 1` steps.
     #[inline]
     pub fn round_below(value: [f32; 3], exponent: i32, limit: i32) -> Rounded {
-        let mut out = [0i128; 3];
-        let mut cut = false;
-        for (o, v) in out.iter_mut().zip(value) {
-            let bits = v.to_bits();
-            let biased = (bits >> 23) & 0xff;
-            if biased == 0xff {
-                return Rounded::Refused;
-            }
-            // |v| = m · 2^(max(biased, 1) − 150); subnormal numbers have no hidden bit.
-            let m = (bits & 0x7f_ffff) | (u32::from(biased != 0) << 23);
-            let shift = biased.max(1) as i32 - 150 + FRACTION_BITS - exponent;
-            let (q, over) = shift_round(u64::from(m), shift, limit);
-            cut |= over;
-            *o = if v.is_sign_negative() { -(q as i128) } else { q as i128 };
+        let (scale, bound) = (power_of_two(FRACTION_BITS - exponent), power_of_two(limit));
+        let steps = value.map(|v| f64::from(v) * scale);
+        if steps.iter().all(|x| x.abs() < bound) {
+            return Rounded::Held(Self(steps.map(nearest)));
         }
-        if cut { Rounded::Cut(Self(out)) } else { Rounded::Held(Self(out)) }
+        if !value.iter().all(|v| v.is_finite()) {
+            return Rounded::Refused;
+        }
+        let most = (1i128 << limit) - 1;
+        let cut = |x: f64| if x.abs() < bound { nearest(x) } else { most * x.signum() as i128 };
+        Rounded::Cut(Self(steps.map(cut)))
     }
 
     /// Adds, modulo 2¹²⁸.
@@ -117,6 +112,17 @@ impl Exact {
     pub fn to_f64(self, exponent: i32) -> [f64; 3] {
         self.0.map(|x| x as f64 * power_of_two(exponent - FRACTION_BITS))
     }
+}
+
+/// The whole number nearest to `x`, ties away from zero, which holds 24 bits and is below 2¹⁰⁸.
+#[inline]
+fn nearest(x: f64) -> i128 {
+    /// Two halves of this many bits: each fits an i64.
+    const HALF: i32 = 48;
+    let high = (x * const { 1.0 / (1u64 << HALF) as f64 }) as i64;
+    // Exact, and so is the sum where a half more or less decides.
+    let rest = x - high as f64 * const { (1u64 << HALF) as f64 };
+    (i128::from(high) << HALF) + i128::from((rest + 0.5f64.copysign(rest)) as i64)
 }
 
 /// Square of a grid number on the grid of squares: `round(x² · 2^(48−2e))`.
@@ -148,9 +154,10 @@ fn shift_round(m: u64, shift: i32, limit: i32) -> (u128, bool) {
     }
 }
 
-/// `2^k`, exact also where f64 needs a subnormal.
+/// `2^k`, exact, for |k| < 1023.
+#[inline]
 pub fn power_of_two(k: i32) -> f64 {
-    2f64.powi(k)
+    f64::from_bits(((1023 + k.clamp(-1022, 1023)) as u64) << 52)
 }
 
 #[cfg(test)]
