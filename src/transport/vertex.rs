@@ -88,10 +88,23 @@ pub struct Scatter {
     pub eta: f32,
 }
 
+/// What `incident` knows of a point, if the material is one for which it matters.
+#[inline]
+fn directions<'i>(scene: &Scene, incident: Option<&'i Incident>, surface: &Surface, cos_g_back: f32) -> Option<&'i Lobes> {
+    let incident = incident.filter(|_| scene.materials.is_guided(surface.material))?;
+    incident.at(surface.p, surface.n_g * cos_g_back.signum())
+}
+
 impl<'a> Vertex<'a> {
     /// Resolves the local model at `surface` for the unit direction `w_back`.
     #[inline]
     pub fn new(scene: &'a Scene, surface: Surface, w_back: Vec3) -> Self {
+        Self::with(scene, surface, w_back, |_| Learned::Nothing)
+    }
+
+    /// The same where something may have been learned; made in place, since it is large.
+    #[inline(always)]
+    fn with(scene: &'a Scene, surface: Surface, w_back: Vec3, learned: impl FnOnce(f32) -> Learned<'a>) -> Self {
         let frame = if scene.materials.needs_tangent(surface.material) {
             Frame::with_tangent(surface.n_s, surface.dp_du)
         } else {
@@ -101,34 +114,24 @@ impl<'a> Vertex<'a> {
         let closure = scene.materials.resolve(surface.material, surface.uv, back.z > 0.0);
         let breadth = scene.materials.breadth(surface.material);
         let cos_g_back = w_back.dot(surface.n_g);
-        Self { surface, frame, closure, w_back, back, cos_g_back, breadth, learned: Learned::Nothing }
-    }
-
-    /// What `incident` knows of this point, if the material is one for which it matters.
-    #[inline]
-    fn directions<'i>(&self, scene: &Scene, incident: Option<&'i Incident>) -> Option<&'i Lobes> {
-        let incident = incident.filter(|_| scene.materials.is_guided(self.surface.material))?;
-        incident.at(self.surface.p, self.surface.n_g * self.cos_g_back.signum())
+        Self { surface, frame, closure, w_back, back, cos_g_back, breadth, learned: learned(cos_g_back) }
     }
 
     /// The same for a gathering walk, which goes where light comes from as far as `incident` knows.
     #[inline]
     pub fn gathering(scene: &'a Scene, incident: Option<&'a Incident>, surface: Surface, w_back: Vec3) -> Self {
-        let mut vertex = Self::new(scene, surface, w_back);
-        if let Some(directions) = vertex.directions(scene, incident) {
-            vertex.learned = Learned::Directions(directions);
-        }
-        vertex
+        Self::with(scene, surface, w_back, |cos_g_back| {
+            directions(scene, incident, &surface, cos_g_back).map_or(Learned::Nothing, Learned::Directions)
+        })
     }
 
     /// The same for a shooting walk, which must know how a gathering walk would go.
     #[inline]
     pub fn shooting(scene: &'a Scene, incident: Option<&Incident>, surface: Surface, w_back: Vec3) -> Self {
-        let mut vertex = Self::new(scene, surface, w_back);
-        if let Some(directions) = vertex.directions(scene, incident) {
-            vertex.learned = Learned::Back(directions.density(w_back));
-        }
-        vertex
+        Self::with(scene, surface, w_back, |cos_g_back| {
+            let directions = directions(scene, incident, &surface, cos_g_back);
+            directions.map_or(Learned::Nothing, |d| Learned::Back(d.density(w_back)))
+        })
     }
 
     /// The density with which `w_back` would be taken as a learned direction; negative where nothing was learned.
