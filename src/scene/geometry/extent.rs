@@ -4,7 +4,8 @@ use super::Geometry;
 use super::analytic::Analytic;
 use super::bake::{Prim, Sampler};
 use super::ray::{Aabb, NONE};
-use super::surface::{DOUBTFUL, normal_of};
+use super::surface::normal_of;
+use super::triangle;
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
@@ -83,23 +84,9 @@ impl Geometry {
         prim.v.map(|v| self.vertices[v as usize].p)
     }
 
-    /// +1 where the normal is that of the order of the vertices, −1 where it is the other one; `None`
-    /// where vertex normals may choose either within the triangle.
     fn side(&self, prim: &Prim) -> Option<f64> {
-        let shape = &self.shapes[prim.shape as usize];
-        if !shape.has_normals {
-            return Some(if shape.flip { -1.0 } else { 1.0 });
-        }
-        let [a, b, c] = self.corner_points(prim);
-        let (face, _) = normal_of(b - a, c - a);
-        let cosines = prim.v.map(|v| self.vertices[v as usize].n.dot(face));
-        if cosines.iter().all(|c| *c > DOUBTFUL) {
-            Some(1.0)
-        } else if cosines.iter().all(|c| *c < -DOUBTFUL) {
-            Some(-1.0)
-        } else {
-            None
-        }
+        let corners = prim.v.map(|v| &self.vertices[v as usize]);
+        triangle::side(corners, &self.shapes[prim.shape as usize]).map(f64::from)
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::bake::{Shape, Vertex};
 use super::sample::ShapePoint;
-use super::surface::{DOUBTFUL, UNIT, normal_of, triangle_error, triangle_slack};
+use super::surface::{UNIT, normal_of, triangle_error, triangle_slack};
 use super::triangle;
 use glam::{Vec2, Vec3};
 
@@ -73,14 +73,9 @@ fn shared<'a>(v: &Vertex, among: [&'a Vertex; 3]) -> Option<&'a Vertex> {
 
 /// Whether the geometric normal is the same all over two triangles in one plane.
 fn one_sided(triangles: [[&Vertex; 3]; 2], shape: &Shape) -> bool {
-    let [first, second] = triangles.map(|[a, b, c]| normal_of(b.p - a.p, c.p - a.p).0);
-    if !shape.has_normals {
-        return first.dot(second) > 0.0;
-    }
-    // Vertex normals decide; without one, the order of corners.
-    let side = |v: &&Vertex| first.dot(v.n);
-    let all = || triangles.iter().flatten().map(side);
-    all().all(|s| s > DOUBTFUL) || all().all(|s| s < -DOUBTFUL)
+    let normal = |t: [&Vertex; 3]| Some(normal_of(t[1].p - t[0].p, t[2].p - t[0].p).0 * triangle::side(t, shape)?);
+    let [first, second] = triangles.map(normal);
+    first.zip(second).is_some_and(|(a, b)| a.dot(b) > 0.0)
 }
 
 #[cfg(test)]

@@ -14,9 +14,6 @@ use glam::{DVec3, Vec2, Vec3};
 /// Unit roundoff of single precision, 2⁻²⁴.
 pub(super) const UNIT: f32 = f32::EPSILON / 2.0;
 
-/// Below this cosine between face and vertex normal, rounding may decide the side.
-pub(super) const DOUBTFUL: f32 = 1e-3;
-
 /// A surface point in the coordinates of its tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Local {

@@ -34,6 +34,26 @@ pub(super) fn orient([a, b, c]: [&Vertex; 3], shape: &Shape, face: Vec3, [w, u, 
     (n, n)
 }
 
+/// Below this cosine between face and vertex normal, rounding may decide the side.
+const DOUBTFUL: f32 = 1e-3;
+
+/// +1 where the geometric normal is that of the order of the vertices, −1 where it is the other one; `None`
+/// where vertex normals may choose either within the triangle.
+pub(super) fn side([a, b, c]: [&Vertex; 3], shape: &Shape) -> Option<f32> {
+    if !shape.has_normals {
+        return Some(if shape.flip { -1.0 } else { 1.0 });
+    }
+    let (face, _) = normal_of(b.p - a.p, c.p - a.p);
+    let cosines = [a, b, c].map(|v| v.n.dot(face));
+    if cosines.iter().all(|c| *c > DOUBTFUL) {
+        Some(1.0)
+    } else if cosines.iter().all(|c| *c < -DOUBTFUL) {
+        Some(-1.0)
+    } else {
+        None
+    }
+}
+
 /// ∂p/∂u from the three texture coordinates; the first edge without any (u is then its barycentric
 /// coordinate); any tangent where they are degenerate.
 fn tangent([a, b, c]: [&Vertex; 3], shape: &Shape, n_g: Vec3) -> Vec3 {
