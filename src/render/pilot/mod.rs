@@ -229,6 +229,8 @@ struct Collect<'p> {
     pilot: &'p Pilot<'p>,
     seen: Vec<Seen>,
     starts: Vec<Option<Start>>,
+    /// What a light path that has arrived nowhere yet started with.
+    light: Option<Emission>,
     guide: &'p Guide,
     tracker: Tracker<'p>,
     /// Step of each vertex that went into the cache.
@@ -240,12 +242,12 @@ struct Collect<'p> {
 impl Observe for Collect<'_> {
     fn started(&mut self, from: Vec3, light: Option<&Emission>) {
         self.tracker.started(from, light);
-        let start = light.and_then(|e| self.pilot.scene.lights.start(self.guide, e));
-        if let Some(last) = self.starts.last_mut() {
-            *last = start;
-        }
+        self.light = light.copied();
     }
     fn arrived(&mut self, surface: &Surface) {
+        if let (Some(light), Some(start)) = (self.light.take(), self.starts.last_mut()) {
+            *start = self.pilot.scene.lights.start(self.guide, &light, surface.p.distance(light.point.y));
+        }
         self.tracker.arrived(surface);
     }
     fn cached(&mut self, _: &LightVertex) {
@@ -542,7 +544,7 @@ impl<'a> Pilot<'a> {
         let keeps = plan.settings.techniques.connect || plan.keeps_vertices();
         let tracker = Tracker::new(self.scene, plan.settings.techniques.next_event, goes);
         let (guide, starts, cached, seen_at) = (&plan.guide, vec![], vec![], vec![]);
-        let mut observe = Collect { pilot: self, seen: vec![], starts, guide, tracker, cached, seen_at };
+        let mut observe = Collect { pilot: self, seen: vec![], starts, light: None, guide, tracker, cached, seen_at };
         let (mut vertices, mut owners, mut pending, mut rays) = (vec![], vec![], vec![], RayCounts::default());
         for index in job * JOB..((job + 1) * JOB).min(paths) {
             let mut random = Random::new(Family::Pilot, u64::from(index), u64::from(round), plan.settings.seed);

@@ -6,7 +6,7 @@
 use crate::scene::geometry::Geometry;
 use crate::spectrum::Spectrum;
 use crate::texture::{TextureSlot, Textures};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +16,11 @@ pub(super) struct Area {
     pub(super) radiance: TextureSlot,
     /// 1/A, m⁻².
     pub(super) p_a: f32,
+    /// Centre of the box around it, and the radius of a sphere around that which holds it, m.
+    pub(super) center: Vec3,
+    pub(super) reach: f32,
+    /// A sphere that shines outwards.
+    pub(super) sphere: bool,
 }
 
 impl Area {

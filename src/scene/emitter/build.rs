@@ -135,11 +135,13 @@ impl Lights {
             return (Emitter::Dark, Spectrum::BLACK);
         }
         let area = geometry.area(shape);
-        if !(area > 0.0 && (1.0 / area).is_finite()) {
+        let extent = geometry.extent(shape).filter(|_| area > 0.0 && (1.0 / area).is_finite());
+        let Some(extent) = extent else {
             problems.warning(emission.place, "the shape of this area emitter has no area, it has no effect");
             return (Emitter::Dark, Spectrum::BLACK);
-        }
-        let area = Area { shape, radiance, p_a: 1.0 / area };
+        };
+        let (center, sphere) = (extent.bounds.center(), geometry.is_outward_sphere(shape));
+        let area = Area { shape, radiance, p_a: 1.0 / area, center, reach: extent.radius, sphere };
         let power = area.power(geometry, &self.textures);
         (Emitter::Area(area), power)
     }

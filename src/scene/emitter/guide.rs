@@ -6,8 +6,8 @@
 //!
 //! | emitter | the square is | unguided density |
 //! |---|---|---|
-//! | area | direction of travel ([`warp::sphere_charts`]) | cosθ/π around the normal |
-//! | sphere, from outside | direction of travel; the position is uniform across it | 1/4π |
+//! | area | direction of the target ([`warp::sphere_charts`], [`super::aim`]) | cosθ/π around the normal |
+//! | sphere, from outside | direction of the target; the position is uniform across the direction of travel, or in the target's view | 1/4π |
 //! | point, spot | direction of travel | the emitter's own |
 //! | parallel, sky | place on the disk across the direction of travel | 1/πR² |
 //!
@@ -19,7 +19,10 @@
 //! alone, so every weight sees the change through [`super::EmissionDensity`] and the measurement stays
 //! unbiased whatever was learned. Compare [Vorba 2014], who guide both walkers.
 
+use super::aim::Aim;
+use super::area::Area;
 use super::choice::Choice;
+use super::lights::aimed;
 use super::{Emission, Emitter, Lights};
 use crate::math::Frame;
 use crate::math::distribution::Discrete;
@@ -33,6 +36,8 @@ use std::sync::Arc;
 pub const UNGUIDED: f32 = 0.2;
 /// Share of the unguided probability in the choice of the emitter.
 const UNGUIDED_CHOICE: f64 = 0.2;
+/// Relative difference between distances that are about the same.
+const SAME_DISTANCE: f32 = 0.1;
 /// Up to so many emitters learn each for itself, more in so many groups; the most probable groups have a
 /// square of their own.
 const MOST_SQUARES: usize = 64;
@@ -45,6 +50,10 @@ pub struct Guide {
     squares: Vec<Option<Quadtree>>,
     /// By group, Σ over light paths of (value)² times the probability of the group.
     moments: Vec<f64>,
+    /// By group, the same sum with each path divided by the length of its first edge.
+    nearness: Vec<f64>,
+    /// By group, the distance from its lamps of what paths are aimed at, m; infinite: they have a direction and no target.
+    distances: Vec<f32>,
     /// Among emitters.
     choice: Option<Discrete>,
 }
@@ -84,6 +93,16 @@ pub struct Start {
     pub at: Vec2,
     /// Density of that point per unit area of the square.
     pub p: f32,
+    /// Length of its first edge, m.
+    pub distance: f32,
+}
+
+/// What a guide draws.
+pub(super) enum Draw<T> {
+    /// Random numbers for what is drawn without a guide.
+    Own(Vec2),
+    /// What was learned.
+    Learned(T),
 }
 
 impl Guide {
@@ -94,7 +113,8 @@ impl Guide {
         order.sort_by(|a, b| probs[*b].total_cmp(&probs[*a]).then(a.cmp(b)));
         let mut squares = vec![None; probs.len()];
         order.into_iter().take(MOST_SQUARES).for_each(|group| squares[group] = Some(Quadtree::default()));
-        Self { groups: Arc::new(groups), squares, moments: vec![0.0; probs.len()], choice: None }
+        let (nothing, distances) = (vec![0.0; probs.len()], vec![f32::INFINITY; probs.len()]);
+        Self { groups: Arc::new(groups), squares, moments: nothing.clone(), nearness: nothing, distances, choice: None }
     }
 
     /// A light path that started at `start` contributed `value` (any measure of what it adds to the
@@ -106,6 +126,7 @@ impl Guide {
             return;
         }
         self.moments[group] += square;
+        self.nearness[group] += square / f64::from(start.distance);
         if let Some(tree) = &mut self.squares[group] {
             tree.learn(start.at, square * f64::from(start.p));
         }
@@ -125,8 +146,17 @@ impl Guide {
             None
         };
         let squares = self.squares.iter().map(|s| s.as_ref().map(|tree| tree.refined(0.0))).collect();
-        let moments = self.moments.iter().map(|m| MEMORY * m).collect();
-        Self { groups: self.groups.clone(), squares, moments, choice }
+        let kept = |sums: &[f64]| sums.iter().map(|m| MEMORY * m).collect();
+        let (moments, nearness) = (kept(&self.moments), kept(&self.nearness));
+        let distances = (0..self.distances.len()).map(|group| self.distance(group)).collect();
+        Self { groups: self.groups.clone(), squares, moments, nearness, distances, choice }
+    }
+
+    /// Distance at which to aim by what was learned: the one so far if that is about right, since squares know targets at that distance.
+    fn distance(&self, group: usize) -> f32 {
+        let (now, learned) = (self.distances[group], (self.moments[group] / self.nearness[group]) as f32);
+        let right = learned.is_nan() || (learned / now - 1.0).abs() < SAME_DISTANCE;
+        if right { now } else { learned }
     }
 
     /// Memory held, in bytes.
@@ -155,40 +185,52 @@ impl Guide {
         Some((group as usize, share))
     }
 
-    /// A direction of travel from `emitter`: by its own sampling (`own`) or the learned one.
+    /// A point of the emitter's square, or what to draw from the emitter's own density with.
     #[inline]
-    pub(super) fn direction(&self, emitter: usize, u: Vec2, own: impl FnOnce(Vec2) -> Vec3) -> Vec3 {
-        match self.square(emitter) {
-            None => own(u),
-            Some(tree) => match split(u) {
-                (true, u) => own(u),
-                (false, u) => warp::sphere_charts(tree.sample(u).0),
-            },
+    fn draw(&self, emitter: usize, u: Vec2) -> Draw<Vec2> {
+        match (self.square(emitter), split(u)) {
+            (None, _) => Draw::Own(u),
+            (Some(_), (true, u)) => Draw::Own(u),
+            (Some(tree), (false, u)) => Draw::Learned(tree.sample(u).0),
         }
     }
 
-    /// Density per steradian of [`Self::direction`], `own` that of the emitter's own sampling.
+    /// A direction in which to go from `emitter`, or to aim.
     #[inline]
-    pub(super) fn direction_density(&self, emitter: usize, w: Vec3, own: f32) -> f32 {
+    pub(super) fn direction(&self, emitter: usize, u: Vec2) -> Draw<Vec3> {
+        match self.draw(emitter, u) {
+            Draw::Own(u) => Draw::Own(u),
+            Draw::Learned(at) => Draw::Learned(warp::sphere_charts(at)),
+        }
+    }
+
+    /// Density per steradian of directions of travel, `own` that of the emitter's own sampling; `learned` is the direction that was
+    /// learned with the density for one per steradian of it.
+    #[inline]
+    pub(super) fn direction_density(&self, emitter: usize, own: f32, learned: impl FnOnce() -> (Vec3, f32)) -> f32 {
         match self.square(emitter) {
             None => own,
             Some(tree) => {
-                let learned = tree.density(warp::sphere_charts_inverse(w)) * warp::SPHERE_UNIFORM_P_W;
+                let (w, stretch) = learned();
+                let learned = tree.density(warp::sphere_charts_inverse(w)) * warp::SPHERE_UNIFORM_P_W * stretch;
                 UNGUIDED * own + (1.0 - UNGUIDED) * learned
             }
         }
     }
 
+    /// Where to aim from a lamp, if there is more to it than a direction.
+    #[inline]
+    pub(super) fn aim(&self, emitter: usize, area: &Area) -> Option<Aim> {
+        let (group, _) = self.group(emitter)?;
+        Aim::new(area, self.distances[group])
+    }
+
     /// A place on the unit disk across the direction of travel.
     #[inline]
     pub(super) fn place(&self, emitter: usize, u: Vec2) -> Vec2 {
-        warp::disk_concentric(match self.square(emitter) {
-            None => u,
-            Some(tree) => match split(u) {
-                (true, u) => u,
-                (false, u) => tree.sample(u).0,
-            },
-        })
+        match self.draw(emitter, u) {
+            Draw::Own(at) | Draw::Learned(at) => warp::disk_concentric(at),
+        }
     }
 
     /// Density of [`Self::place`] relative to the uniform one.
@@ -214,20 +256,22 @@ impl Lights {
         alone
     }
 
-    /// Where a light path started, as the guide sees it; `None` for what it cannot learn.
-    pub fn start(&self, guide: &Guide, e: &Emission) -> Option<Start> {
+    /// Where a light path started, as the guide sees it, whose first edge is `distance` long; `None` for what it cannot learn.
+    pub fn start(&self, guide: &Guide, e: &Emission, distance: f32) -> Option<Start> {
         let emitter = e.point.emitter.0 as usize;
         let prob = guide.choice(&self.choice.as_ref()?.emission).prob(emitter);
         let (at, p) = match &self.emitters[emitter] {
-            Emitter::Area(_) | Emitter::Point(_) | Emitter::Spot(_) => {
-                (warp::sphere_charts_inverse(e.w), e.density.p_next * (4.0 * PI))
+            Emitter::Area(area) => {
+                let (w, stretch) = aimed(guide.aim(emitter, area), e.point.y, e.w);
+                (warp::sphere_charts_inverse(w), e.density.p_next * (4.0 * PI) / stretch)
             }
+            Emitter::Point(_) | Emitter::Spot(_) => (warp::sphere_charts_inverse(e.w), e.density.p_next * (4.0 * PI)),
             Emitter::Parallel(_) | Emitter::Sky(_) => {
                 (warp::disk_concentric_inverse(self.disk(e.w, e.point.y)), e.density.p_next / self.p_across)
             }
             Emitter::Dark => return None,
         };
-        Some(Start { emitter, prob, at, p })
+        Some(Start { emitter, prob, at, p, distance })
     }
 
     /// Place of `x` on the unit disk across the direction of travel `w`.

@@ -1,6 +1,9 @@
 //! All emitters of a scene with the densities of choosing them: the four questions of transport.
 
+use super::aim::Aim;
+use super::area::Area;
 use super::choice::Choice;
+use super::guide::Draw;
 use super::{Emission, EmissionDensity, Emitter, EmitterInfo, EmitterPoint, Guide, NextEvent};
 use crate::math::{Frame, warp};
 use crate::scene::EmitterId;
@@ -119,27 +122,34 @@ impl Lights {
         let emitter = EmitterId(i as u32);
         match &self.emitters[i] {
             Emitter::Area(area) => {
-                let (s, w) = self.emit_from_area(geometry, guide, area.shape, (i, u_position, u_direction));
+                let (s, w) = self.emit_from_area(geometry, guide, area, (i, u_position, u_direction))?;
                 let cos = s.n_g.dot(w);
                 let radiance = self.textures.eval(area.radiance, s.uv);
                 if cos <= 0.0 || radiance.is_black() {
                     return None;
                 }
                 let point = EmitterPoint { emitter, y: s.p, y_error: s.p_error, n_g: s.n_g, uv: s.uv };
-                let density =
-                    EmissionDensity { p_k: prob * s.p_a, p_next: self.density_direction(geometry, guide, i, &point, w) };
+                let p_k = prob * geometry.density_across(area.shape, point.n_g, w).unwrap_or(area.p_a);
+                let density = EmissionDensity { p_k, p_next: self.density_direction(guide, i, &point, w) };
                 emitted(point, w, radiance * cos, density, false, false)
             }
             Emitter::Point(p) => {
-                let w = guide.direction(i, u_direction, warp::sphere_uniform);
-                let p_next = guide.direction_density(i, w, warp::SPHERE_UNIFORM_P_W);
-                let density = EmissionDensity { p_k: prob, p_next };
-                emitted(EmitterPoint::delta(emitter, p.position), w, p.intensity, density, true, false)
+                let w = match guide.direction(i, u_direction) {
+                    Draw::Own(u) => warp::sphere_uniform(u),
+                    Draw::Learned(w) => w,
+                };
+                let point = EmitterPoint::delta(emitter, p.position);
+                let density = EmissionDensity { p_k: prob, p_next: self.density_direction(guide, i, &point, w) };
+                emitted(point, w, p.intensity, density, true, false)
             }
             Emitter::Spot(s) => {
-                let w = guide.direction(i, u_direction, |u| s.sample(u).0);
-                let density = EmissionDensity { p_k: prob, p_next: guide.direction_density(i, w, s.density(w)) };
-                emitted(EmitterPoint::delta(emitter, s.position), w, s.intensity(&self.textures, w), density, true, false)
+                let w = match guide.direction(i, u_direction) {
+                    Draw::Own(u) => s.sample(u).0,
+                    Draw::Learned(w) => w,
+                };
+                let point = EmitterPoint::delta(emitter, s.position);
+                let density = EmissionDensity { p_k: prob, p_next: self.density_direction(guide, i, &point, w) };
+                emitted(point, w, s.intensity(&self.textures, w), density, true, false)
             }
             Emitter::Parallel(p) => self.emit_from_infinity(
                 guide,
@@ -157,24 +167,35 @@ impl Lights {
         }
     }
 
-    /// A point of an area light (`p_a` given its direction where that comes first) and a direction.
+    /// A point of an area light and a direction from it.
     #[inline]
     fn emit_from_area(
         &self,
         geometry: &Geometry,
         guide: &Guide,
-        shape: u32,
+        area: &Area,
         (emitter, u_position, u_direction): (usize, Vec2, Vec2),
-    ) -> (ShapePoint, Vec3) {
-        if geometry.is_outward_sphere(shape) {
-            let w = guide.direction(emitter, u_direction, warp::sphere_uniform);
-            if let Some(s) = geometry.sample_across(shape, w, u_position) {
-                return (s, w);
+    ) -> Option<(ShapePoint, Vec3)> {
+        let shape = area.shape;
+        let anywhere = || geometry.sample_area(shape, u_position);
+        let from_across = |w| Some((geometry.sample_across(shape, w, u_position)?, w));
+        match guide.direction(emitter, u_direction) {
+            Draw::Own(u) if area.sphere => from_across(warp::sphere_uniform(u)),
+            Draw::Own(u) => {
+                let s = anywhere();
+                Some((s, Frame::around(s.n_g).to_world(warp::hemisphere_cosine(u))))
             }
+            Draw::Learned(w0) => match guide.aim(emitter, area) {
+                None if area.sphere => from_across(w0),
+                None => Some((anywhere(), w0)),
+                Some(aim) => {
+                    let target = aim.target(w0);
+                    let seen = || geometry.sample_toward(shape, target, u_position, !area.radiance.is_constant());
+                    let s = if area.sphere { seen()? } else { anywhere() };
+                    Some((s, (target - s.p).normalize()))
+                }
+            },
         }
-        let s = geometry.sample_area(shape, u_position);
-        let w = guide.direction(emitter, u_direction, |u| Frame::around(s.n_g).to_world(warp::hemisphere_cosine(u)));
-        (s, w)
     }
 
     /// Starts on the disk behind the scene's sphere, across the direction of travel.
@@ -217,24 +238,24 @@ impl Lights {
         };
         let p_next = match &self.emitters[i] {
             Emitter::Parallel(_) | Emitter::Sky(_) => self.p_across * guide.place_density(i, self.disk(w_travel, x)),
-            _ => self.density_direction(geometry, guide, i, point, w_travel),
+            _ => self.density_direction(guide, i, point, w_travel),
         };
         EmissionDensity { p_k, p_next }
     }
 
     /// Density per steradian of the direction of travel from a finite emitter.
     #[inline]
-    fn density_direction(&self, geometry: &Geometry, guide: &Guide, i: usize, point: &EmitterPoint, w: Vec3) -> f32 {
+    fn density_direction(&self, guide: &Guide, i: usize, point: &EmitterPoint, w: Vec3) -> f32 {
         let own = match &self.emitters[i] {
-            Emitter::Area(area) => match geometry.density_across(area.shape, point.n_g, w) {
-                Some(_) => warp::SPHERE_UNIFORM_P_W,
-                None => warp::hemisphere_cosine_p_w(point.n_g.dot(w)),
-            },
+            Emitter::Area(area) => {
+                let own = if area.sphere { warp::SPHERE_UNIFORM_P_W } else { warp::hemisphere_cosine_p_w(point.n_g.dot(w)) };
+                return guide.direction_density(i, own, || aimed(guide.aim(i, area), point.y, w));
+            }
             Emitter::Point(_) => warp::SPHERE_UNIFORM_P_W,
             Emitter::Spot(s) => s.density(w),
             _ => return 0.0,
         };
-        guide.direction_density(i, w, own)
+        guide.direction_density(i, own, || (w, 1.0))
     }
 
     /// Lᵉ of a light point that was hit, along the direction of travel: black from behind and for
@@ -332,6 +353,12 @@ impl Lights {
         let i = emitter.0 as usize;
         if i < self.emitters.len() { Some((self.choice.as_ref()?, i)) } else { None }
     }
+}
+
+/// The direction that is learned of a path from `y` along `w`, and the density of w for one of it.
+#[inline]
+pub(super) fn aimed(aim: Option<Aim>, y: Vec3, w: Vec3) -> (Vec3, f32) {
+    aim.map_or((w, 1.0), |aim| aim.of(y, w))
 }
 
 /// Unit direction, distance and 1/d² from `x` to `y`; `None` where they are too near to have any.

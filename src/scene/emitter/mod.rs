@@ -19,6 +19,7 @@
 //! many emitters P_n depends on x: a tree over them (`tree`) finds those that matter there.
 //! The set of emitters is closed: an enum, matched once per question.
 
+mod aim;
 mod area;
 mod build;
 mod choice;

@@ -64,17 +64,21 @@ fn mean(samples: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// What a pilot might learn: some emitters, directions and places matter more than others.
-pub(super) fn learned(world: &World) -> Guide {
+pub(super) fn learned(world: &World, distance: f32) -> Guide {
+    let ahead = |e: &Emission| (e.w.x + 0.3 * e.w.y - 0.4).abs() < 0.1 || (e.infinite && e.point.y.y > 0.5);
+    learned_of(world, distance, |e| if ahead(e) { (1 + e.point.emitter.0) as f32 } else { 0.0 })
+}
+
+/// The same of paths whose first edge is `distance` long and whose flux is worth so much.
+fn learned_of(world: &World, distance: f32, worth: impl Fn(&Emission) -> f32) -> Guide {
     let mut guide = Guide::new(&world.lights);
     let mut random = Random::new(Family::Other, 21, 0, 0);
     for _ in 0..4 {
         for _ in 0..20_000 {
             let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
             let e = world.lights.sample_emission(&world.geometry, &guide, pick, position, direction);
-            if let Some((e, start)) = e.and_then(|e| Some((e, world.lights.start(&guide, &e)?))) {
-                let ahead = (e.w.x + 0.3 * e.w.y - 0.4).abs() < 0.1 || (e.infinite && e.point.y.y > 0.5);
-                let flux = e.weight.mean() * (1 + start.emitter) as f32;
-                guide.learn(&start, if ahead { f64::from(flux) } else { 0.0 });
+            if let Some((e, start)) = e.and_then(|e| Some((e, world.lights.start(&guide, &e, distance)?))) {
+                guide.learn(&start, f64::from(e.weight.mean() * worth(&e)));
             }
         }
         guide = guide.refined(&world.lights);
@@ -93,14 +97,23 @@ fn emitted_flux_is_power() {
 #[test]
 fn emitted_flux_is_power_when_guided() {
     let world = everything();
-    flux_is_power(&world, &learned(&world));
+    for distance in DISTANCES {
+        flux_is_power(&world, &learned(&world, distance));
+    }
 }
+
+/// Nothing to aim at; all lamps aim; only the sphere does, which is smaller than the others.
+const DISTANCES: [f32; 3] = [f32::INFINITY, 3.0, 0.9];
 
 /// A guide's densities are those of its samples, and it does send light where it was told to.
 #[test]
 fn guided_densities_are_told() {
     let world = everything();
-    let (unguided, guided) = (Guide::default(), learned(&world));
+    DISTANCES.into_iter().for_each(|distance| guided_densities_are_told_at(&world, distance));
+}
+
+fn guided_densities_are_told_at(world: &World, distance: f32) {
+    let (unguided, guided) = (Guide::default(), learned(world, distance));
     let mut random = Random::new(Family::Other, 22, 0, 0);
     let (n, mut ahead) = (50_000, [[0.0f64; 2]; 2]);
     for _ in 0..n {
@@ -121,7 +134,33 @@ fn guided_densities_are_told() {
         }
     }
     let [unguided, guided] = ahead.map(|[aside, ahead]| ahead / (aside + ahead));
-    assert!(guided > 2.5 * unguided, "a share of {unguided} went ahead unguided, of {guided} guided");
+    // Paths that are aimed do not learn directions.
+    let more = if distance.is_infinite() { 2.5 } else { 1.0 };
+    assert!(guided > more * unguided, "a share of {unguided} went ahead unguided, of {guided} guided");
+}
+
+/// From lamps larger than what they should meet, paths that are aimed meet it more often than those that have learned directions.
+#[test]
+fn aimed_paths_meet_what_they_should() {
+    let world = everything();
+    let target = Vec3::new(0.5, -0.3, 0.1);
+    let meets = |e: &Emission| (target - e.point.y).reject_from(e.w).length() < 0.15;
+    let shares = [f32::INFINITY, 3.0].map(|distance| {
+        let guide = learned_of(&world, distance, |e| f32::from(u8::from(e.point.emitter.0 < 3 && meets(e))));
+        let (mut random, mut met, mut all) = (Random::new(Family::Other, 23, 0, 0), [0.0f64; 3], [0.0; 3]);
+        for _ in 0..100_000 {
+            let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
+            let e = world.lights.sample_emission(&world.geometry, &guide, pick, position, direction);
+            if let Some(e) = e.filter(|e| e.point.emitter.0 < 3) {
+                all[e.point.emitter.0 as usize] += 1.0;
+                met[e.point.emitter.0 as usize] += f64::from(u8::from(meets(&e)));
+            }
+        }
+        [0, 1, 2].map(|i| met[i] / all[i])
+    });
+    for i in 0..3 {
+        assert!(shares[1][i] > 1.5 * shares[0][i], "of lamp {i} {} meet it, by directions {}", shares[1][i], shares[0][i]);
+    }
 }
 
 /// Checks every emitter; how often each was chosen and shone.

@@ -405,7 +405,7 @@ fn groups_hold_all_emitters() {
 #[test]
 fn guided_flux_of_many_is_power() {
     let world = many(80, 60, true, 51);
-    let guide = learned(&world);
+    let guide = learned(&world, 5.0);
     let mut random = Random::new(Family::Other, 53, 0, 0);
     let power: f64 = world.lights.infos().iter().map(|i| f64::from(i.power.iter().sum::<f32>() / 3.0)).sum();
     let n = 400_000;
