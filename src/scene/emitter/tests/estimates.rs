@@ -139,6 +139,31 @@ fn guided_densities_are_told_at(world: &World, distance: f32) {
     assert!(guided > more * unguided, "a share of {unguided} went ahead unguided, of {guided} guided");
 }
 
+/// Each lamp alone, with targets just far enough away, where the densities of aimed paths differ most from those of directions.
+#[test]
+fn emitted_flux_is_power_when_aimed() {
+    let lamps = [
+        (Form::Rectangle, 2.9),
+        (Form::Disk, 2.05),
+        (Form::Sphere { center: Vec3::ZERO, radius: 1.0 }, 2.05),
+        (Form::Cylinder { p0: Vec3::ZERO, p1: Vec3::new(0.4, 0.3, 1.0), radius: 0.4 }, 1.6),
+    ];
+    for (form, distance) in lamps {
+        let world = World::new(vec![(shape(form, Mat4::from_rotation_y(0.7)), constant([1.0; 3])), ball()], vec![]);
+        let guide = learned_of(&world, distance, |_| 1.0);
+        let mut random = Random::new(Family::Other, 24, 0, 0);
+        let samples = (0..1_000_000).map(|_| {
+            let (pick, position, direction) = (random.unit(), random.unit2(), random.unit2());
+            let e = world.lights.sample_emission(&world.geometry, &guide, pick, position, direction);
+            e.map_or(0.0, |e| f64::from(e.weight.0.x))
+        });
+        let ((got, error), power) = (mean(samples), f64::from(world.lights.infos()[0].power[0]));
+        println!("{:.5} ± {:.5}", got / power, error / power);
+        assert!((got - power).abs() < 4.0 * error + 1e-4 * power, "{got} ± {error} W for {power} W");
+        assert!(error < 2e-3 * power);
+    }
+}
+
 /// From lamps larger than what they should meet, paths that are aimed meet it more often than those that have learned directions.
 #[test]
 fn aimed_paths_meet_what_they_should() {
