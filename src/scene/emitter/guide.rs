@@ -50,8 +50,8 @@ pub struct Guide {
     squares: Vec<Option<Quadtree>>,
     /// By group, Σ over light paths of (value)² times the probability of the group.
     moments: Vec<f64>,
-    /// By group, the same sum with each path divided by the length of its first edge.
-    nearness: Vec<f64>,
+    /// By group, the same sum with each path times d and d², d the length of its first edge.
+    lengths: Vec<[f64; 2]>,
     /// By group, the distance from its lamps of what paths are aimed at, m; infinite: they have a direction and no target.
     distances: Vec<f32>,
     /// Among emitters.
@@ -113,8 +113,9 @@ impl Guide {
         order.sort_by(|a, b| probs[*b].total_cmp(&probs[*a]).then(a.cmp(b)));
         let mut squares = vec![None; probs.len()];
         order.into_iter().take(MOST_SQUARES).for_each(|group| squares[group] = Some(Quadtree::default()));
-        let (nothing, distances) = (vec![0.0; probs.len()], vec![f32::INFINITY; probs.len()]);
-        Self { groups: Arc::new(groups), squares, moments: nothing.clone(), nearness: nothing, distances, choice: None }
+        let n = probs.len();
+        let (moments, lengths, distances) = (vec![0.0; n], vec![[0.0; 2]; n], vec![f32::INFINITY; n]);
+        Self { groups: Arc::new(groups), squares, moments, lengths, distances, choice: None }
     }
 
     /// A light path that started at `start` contributed `value` (any measure of what it adds to the
@@ -126,7 +127,9 @@ impl Guide {
             return;
         }
         self.moments[group] += square;
-        self.nearness[group] += square / f64::from(start.distance);
+        let d = f64::from(start.distance);
+        self.lengths[group][0] += square * d;
+        self.lengths[group][1] += square * d * d;
         if let Some(tree) = &mut self.squares[group] {
             tree.learn(start.at, square * f64::from(start.p));
         }
@@ -146,15 +149,19 @@ impl Guide {
             None
         };
         let squares = self.squares.iter().map(|s| s.as_ref().map(|tree| tree.refined(0.0))).collect();
-        let kept = |sums: &[f64]| sums.iter().map(|m| MEMORY * m).collect();
-        let (moments, nearness) = (kept(&self.moments), kept(&self.nearness));
+        let moments = self.moments.iter().map(|m| MEMORY * m).collect();
+        let lengths = self.lengths.iter().map(|sums| sums.map(|m| MEMORY * m)).collect();
         let distances = (0..self.distances.len()).map(|group| self.distance(group)).collect();
-        Self { groups: self.groups.clone(), squares, moments, nearness, distances, choice }
+        Self { groups: self.groups.clone(), squares, moments, lengths, distances, choice }
     }
 
     /// Distance at which to aim by what was learned: the one so far if that is about right, since squares know targets at that distance.
+    ///
+    /// Paths to one target from points a length r apart are r·|1 − d/D| apart at a distance d. The mean square of that is least for
+    /// D = Σd²/Σd.
     fn distance(&self, group: usize) -> f32 {
-        let (now, learned) = (self.distances[group], (self.moments[group] / self.nearness[group]) as f32);
+        let [first, second] = self.lengths[group];
+        let (now, learned) = (self.distances[group], (second / first) as f32);
         let right = learned.is_nan() || (learned / now - 1.0).abs() < SAME_DISTANCE;
         if right { now } else { learned }
     }
