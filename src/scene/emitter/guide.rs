@@ -6,7 +6,7 @@
 //!
 //! | emitter | the square is | unguided density |
 //! |---|---|---|
-//! | area | direction of the target ([`warp::sphere_charts`], [`super::aim`]) | cosθ/π around the normal |
+//! | area | direction of the target ([`warp::sphere_charts`], `aim`) | cosθ/π around the normal |
 //! | sphere, from outside | direction of the target; the position is uniform across the direction of travel, or in the target's view | 1/4π |
 //! | point, spot | direction of travel | the emitter's own |
 //! | parallel, sky | place on the disk across the direction of travel | 1/πR² |

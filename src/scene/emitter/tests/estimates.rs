@@ -183,8 +183,9 @@ fn aimed_paths_meet_what_they_should() {
         }
         [0, 1, 2].map(|i| met[i] / all[i])
     });
-    for i in 0..3 {
-        assert!(shares[1][i] > 1.5 * shares[0][i], "of lamp {i} {} meet it, by directions {}", shares[1][i], shares[0][i]);
+    let [directions, targets] = shares;
+    for (lamp, (by_direction, aimed)) in directions.into_iter().zip(targets).enumerate() {
+        assert!(aimed > 1.5 * by_direction, "of lamp {lamp} {aimed} meet it, by directions {by_direction}");
     }
 }
 
