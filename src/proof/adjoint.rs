@@ -147,7 +147,7 @@ pub fn adjoint(scene: &mut Scene, effort: &Effort) -> Result<Adjoint, Refused> {
     let lit: Result<Vec<Lit>, Refused> = groups
         .iter()
         .map(|group| {
-            scene.lights = all.only(&scene.geometry, group);
+            scene.lights = all.only(group);
             lit(scene, names(&all, group), &effort)
         })
         .collect();

@@ -28,12 +28,13 @@ impl Aim {
     /// At `distance` from the lamp, or nowhere: so near or so far that directions are all there is to learn.
     #[inline]
     pub(super) fn new(area: &Area, distance: f32) -> Option<Self> {
-        if !(distance >= NEAREST * area.reach && distance < f32::MAX) {
+        let reach = area.extent.radius;
+        if !(distance >= NEAREST * reach && distance < f32::MAX) {
             return None;
         }
         let cos = |sin: f32| (1.0 - sin * sin).max(0.0).sqrt();
-        let cone = area.sphere.then(|| 0.5 + 0.5 * cos(area.reach / distance));
-        Some(Self { center: area.center, distance, cone })
+        let cone = area.sphere.then(|| 0.5 + 0.5 * cos(reach / distance));
+        Some(Self { center: area.extent.bounds.center(), distance, cone })
     }
 
     /// The target in direction `w0` from the centre.

@@ -3,10 +3,10 @@
 //! Power Φ = π ∫ Lᵉ dA. Emission starts uniformly by area and leaves cosine-weighted,
 //! `p = 1/A · cosθ/π`, so that the weight Lᵉ·π·A varies with the texture only.
 
-use crate::scene::geometry::Geometry;
+use crate::scene::geometry::{Extent, Geometry};
 use crate::spectrum::Spectrum;
 use crate::texture::{TextureSlot, Textures};
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use std::f32::consts::PI;
 
 #[derive(Clone, Copy, Debug)]
@@ -16,9 +16,8 @@ pub(super) struct Area {
     pub(super) radiance: TextureSlot,
     /// 1/A, m⁻².
     pub(super) p_a: f32,
-    /// Centre of the box around it, and the radius of a sphere around that which holds it, m.
-    pub(super) center: Vec3,
-    pub(super) reach: f32,
+    /// Where it lies.
+    pub(super) extent: Extent,
     /// A sphere that shines outwards.
     pub(super) sphere: bool,
 }

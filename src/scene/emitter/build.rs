@@ -75,7 +75,7 @@ impl Lights {
             let (emitter, power) = lights.other(other, images, problems);
             lights.push(emitter, kind_of(&other.model), &other.id, power, other.place, problems);
         }
-        lights.choose(geometry);
+        lights.choose();
         lights
     }
 
@@ -112,9 +112,9 @@ impl Lights {
     }
 
     /// What bounds the light of a finite emitter of so much power.
-    pub(super) fn bound(&self, i: usize, power: f64, geometry: &Geometry) -> Option<Bound> {
+    pub(super) fn bound(&self, i: usize, power: f64) -> Option<Bound> {
         match &self.emitters[i] {
-            Emitter::Area(area) => Some(Bound::area(&geometry.extent(area.shape)?, power)),
+            Emitter::Area(area) => Some(Bound::area(&area.extent, power)),
             Emitter::Point(point) => Some(Bound::point(point, power)),
             Emitter::Spot(spot) => Some(Bound::spot(spot, power)),
             Emitter::Parallel(_) | Emitter::Sky(_) | Emitter::Dark => None,
@@ -140,8 +140,7 @@ impl Lights {
             problems.warning(emission.place, "the shape of this area emitter has no area, it has no effect");
             return (Emitter::Dark, Spectrum::BLACK);
         };
-        let (center, sphere) = (extent.bounds.center(), geometry.is_outward_sphere(shape));
-        let area = Area { shape, radiance, p_a: 1.0 / area, center, reach: extent.radius, sphere };
+        let area = Area { shape, radiance, p_a: 1.0 / area, extent, sphere: geometry.is_outward_sphere(shape) };
         let power = area.power(geometry, &self.textures);
         (Emitter::Area(area), power)
     }

@@ -22,7 +22,6 @@
 use super::aim::Aim;
 use super::area::Area;
 use super::choice::Choice;
-use super::lights::aimed;
 use super::{Emission, Emitter, Lights};
 use crate::math::Frame;
 use crate::math::distribution::Discrete;
@@ -232,6 +231,12 @@ impl Guide {
         Aim::new(area, self.distances[group])
     }
 
+    /// The direction that was learned of a path from `y` on a lamp along `w`, and the density per steradian of w for one of it.
+    #[inline]
+    pub(super) fn aimed(&self, emitter: usize, area: &Area, y: Vec3, w: Vec3) -> (Vec3, f32) {
+        self.aim(emitter, area).map_or((w, 1.0), |aim| aim.of(y, w))
+    }
+
     /// A place on the unit disk across the direction of travel.
     #[inline]
     pub(super) fn place(&self, emitter: usize, u: Vec2) -> Vec2 {
@@ -269,7 +274,7 @@ impl Lights {
         let prob = guide.choice(&self.choice.as_ref()?.emission).prob(emitter);
         let (at, p) = match &self.emitters[emitter] {
             Emitter::Area(area) => {
-                let (w, stretch) = aimed(guide.aim(emitter, area), e.point.y, e.w);
+                let (w, stretch) = guide.aimed(emitter, area, e.point.y, e.w);
                 (warp::sphere_charts_inverse(w), e.density.p_next * (4.0 * PI) / stretch)
             }
             Emitter::Point(_) | Emitter::Spot(_) => (warp::sphere_charts_inverse(e.w), e.density.p_next * (4.0 * PI)),

@@ -1,6 +1,5 @@
 //! All emitters of a scene with the densities of choosing them: the four questions of transport.
 
-use super::aim::Aim;
 use super::area::Area;
 use super::choice::Choice;
 use super::guide::Draw;
@@ -249,7 +248,7 @@ impl Lights {
         let own = match &self.emitters[i] {
             Emitter::Area(area) => {
                 let own = if area.sphere { warp::SPHERE_UNIFORM_P_W } else { warp::hemisphere_cosine_p_w(point.n_g.dot(w)) };
-                return guide.direction_density(i, own, || aimed(guide.aim(i, area), point.y, w));
+                return guide.direction_density(i, own, || guide.aimed(i, area, point.y, w));
             }
             Emitter::Point(_) => warp::SPHERE_UNIFORM_P_W,
             Emitter::Spot(s) => s.density(w),
@@ -353,12 +352,6 @@ impl Lights {
         let i = emitter.0 as usize;
         if i < self.emitters.len() { Some((self.choice.as_ref()?, i)) } else { None }
     }
-}
-
-/// The direction that is learned of a path from `y` along `w`, and the density of w for one of it.
-#[inline]
-pub(super) fn aimed(aim: Option<Aim>, y: Vec3, w: Vec3) -> (Vec3, f32) {
-    aim.map_or((w, 1.0), |aim| aim.of(y, w))
 }
 
 /// Unit direction, distance and 1/d² from `x` to `y`; `None` where they are too near to have any.

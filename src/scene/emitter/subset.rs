@@ -3,11 +3,10 @@
 use super::choice::Choice;
 use super::{Emitter, Lights};
 use crate::scene::EmitterId;
-use crate::scene::geometry::Geometry;
 
 impl Lights {
     /// These emitters as they are, the others dark.
-    pub fn only(&self, geometry: &Geometry, kept: &[EmitterId]) -> Self {
+    pub fn only(&self, kept: &[EmitterId]) -> Self {
         let mut lights = self.clone();
         let mut on = vec![false; lights.emitters.len()];
         kept.iter().for_each(|id| on[id.0 as usize] = true);
@@ -18,7 +17,7 @@ impl Lights {
                 (*emitter, info.power) = (Emitter::Dark, [0.0; 3]);
             }
         }
-        lights.choose(geometry);
+        lights.choose();
         lights
     }
 
@@ -36,13 +35,13 @@ impl Lights {
     }
 
     /// Decides how often each emitter is chosen, by their powers.
-    pub(super) fn choose(&mut self, geometry: &Geometry) {
+    pub(super) fn choose(&mut self) {
         let power = |(emitter, info): (&Emitter, &super::EmitterInfo)| match emitter {
             Emitter::Dark => 0.0,
             _ => info.power.iter().map(|p| f64::from(*p)).sum::<f64>() / 3.0,
         };
         let powers: Vec<f64> = self.emitters.iter().zip(&self.infos).map(power).collect();
-        self.choice = Choice::new(&powers, self.p_across, |i| self.bound(i, powers[i], geometry));
+        self.choice = Choice::new(&powers, self.p_across, |i| self.bound(i, powers[i]));
         for (i, info) in self.infos.iter_mut().enumerate() {
             info.prob_next_event = self.choice.as_ref().map_or(0.0, |c| c.next_event.prob_anywhere(i));
             info.prob_emission = self.choice.as_ref().map_or(0.0, |c| c.emission.prob(i));
