@@ -171,6 +171,11 @@ impl Materials {
         self.sides.extend([front, back]);
     }
 
+    /// Bytes of the images of textures.
+    pub fn image_bytes(&self) -> usize {
+        self.textures.bytes()
+    }
+
     /// Number of materials, the default one included.
     pub fn len(&self) -> usize {
         self.summaries.len()

@@ -10,8 +10,7 @@ use super::hash::content_hash;
 use super::sensor::Sensor;
 use super::{EmitterId, MaterialId, Scene};
 use crate::describe::{
-    AreaEmission, ImageDescription, MeshDescription, Place, Problems, SceneDescription, ShapeDescription, ShapeModel,
-    TextureDescription,
+    AreaEmission, MeshDescription, Place, Problems, SceneDescription, ShapeDescription, ShapeModel, TextureDescription,
 };
 use crate::local::Materials;
 use glam::Vec3;
@@ -35,7 +34,7 @@ pub struct SceneInfo {
     pub geometry_bytes: usize,
     /// Bytes of the emitters' tables.
     pub emitter_bytes: usize,
-    /// Bytes of the decoded images.
+    /// Bytes of images, as textures and emitters keep them.
     pub image_bytes: usize,
 }
 
@@ -83,7 +82,6 @@ impl Scene {
             seed: chosen.seed,
             used_materials,
             hash: content_hash(description, chosen),
-            image_bytes: description.images.iter().map(image_bytes).sum(),
         };
         Ok((scene, problems))
     }
@@ -100,7 +98,7 @@ impl Scene {
             emitters: self.lights.infos().to_vec(),
             geometry_bytes: self.geometry.bytes(),
             emitter_bytes: self.lights.bytes(),
-            image_bytes: self.image_bytes,
+            image_bytes: self.materials.image_bytes() + self.lights.image_bytes(),
         }
     }
 }
@@ -108,13 +106,6 @@ impl Scene {
 /// The value, its problems moved to `problems` if it is none.
 fn keep<T>(built: Result<T, Problems>, problems: &mut Problems) -> Option<T> {
     built.map_err(|p| problems.list.extend(p.list)).ok()
-}
-
-fn image_bytes(image: &ImageDescription) -> usize {
-    match image {
-        ImageDescription::Data(image) => size_of_val(&image.data[..]),
-        ImageDescription::File { .. } => 0,
-    }
 }
 
 /// Shapes with their ids resolved.

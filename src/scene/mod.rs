@@ -44,7 +44,6 @@ pub struct Scene {
     /// Local models that some shape has, each once.
     pub used_materials: Vec<MaterialId>,
     hash: [u8; 32],
-    image_bytes: usize,
 }
 
 impl Scene {

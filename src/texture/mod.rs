@@ -7,13 +7,17 @@
 
 mod bitmap;
 mod checkerboard;
+mod texels;
 
 pub use bitmap::Bitmap;
 pub use checkerboard::Checkerboard;
+pub use texels::Texels;
 
-use crate::describe::{ImageDescription, Place, Problems, TextureDescription};
+use crate::describe::{ImageDescription, ImageId, Place, Problems, TextureDescription};
 use crate::spectrum::Spectrum;
 use glam::{Affine2, Mat2, Mat4, Vec2};
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A texture as its user keeps it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +46,8 @@ impl TextureSlot {
 pub struct Textures {
     bitmaps: Vec<Bitmap>,
     checkers: Vec<Checkerboard>,
+    /// Those of bitmaps.
+    images: HashMap<ImageId, Arc<Texels>>,
 }
 
 impl Textures {
@@ -53,8 +59,8 @@ impl Textures {
             TextureDescription::Constant([r, g, b]) => TextureSlot::Constant(Spectrum::rgb(*r, *g, *b)),
             TextureDescription::Bitmap { image, filter, wrap, to_uv, place } => {
                 let Some(to_uv) = affine(to_uv, *place, problems) else { return BLACK };
-                match Bitmap::new(images.get(image.0 as usize), *filter, *wrap, to_uv) {
-                    Ok(bitmap) => TextureSlot::Image(intern(&mut self.bitmaps, bitmap)),
+                match self.texels(*image, images) {
+                    Ok(texels) => TextureSlot::Image(intern(&mut self.bitmaps, Bitmap::new(texels, *filter, *wrap, to_uv))),
                     Err(what) => {
                         problems.error(*place, what);
                         BLACK
@@ -67,6 +73,21 @@ impl Textures {
                 TextureSlot::Checker(intern(&mut self.checkers, Checkerboard { colors, to_uv }))
             }
         }
+    }
+
+    /// The texels of an image, made when they are first asked for.
+    fn texels(&mut self, id: ImageId, images: &[ImageDescription]) -> Result<Arc<Texels>, &'static str> {
+        if let Some(texels) = self.images.get(&id) {
+            return Ok(texels.clone());
+        }
+        let texels = Arc::new(Texels::new(images.get(id.0 as usize))?);
+        self.images.insert(id, texels.clone());
+        Ok(texels)
+    }
+
+    /// Memory of the images, in bytes.
+    pub fn bytes(&self) -> usize {
+        self.images.values().map(|t| t.bytes()).sum()
     }
 
     /// The texture at texture coordinates `uv`.
@@ -118,7 +139,7 @@ impl Textures {
     pub fn mean_spectrum(&self, slot: TextureSlot) -> Spectrum {
         match slot {
             TextureSlot::Constant(c) => c,
-            TextureSlot::Image(i) => self.bitmaps[i as usize].mean(),
+            TextureSlot::Image(i) => self.bitmaps[i as usize].texels().mean(),
             TextureSlot::Checker(i) => {
                 let [a, b] = self.checkers[i as usize].colors;
                 0.5 * (self.mean_spectrum(a) + self.mean_spectrum(b))
@@ -131,7 +152,7 @@ impl Textures {
     pub fn mean(&self, slot: TextureSlot) -> f32 {
         match slot {
             TextureSlot::Constant(c) => c.mean(),
-            TextureSlot::Image(i) => grey(self.bitmaps[i as usize].mean()),
+            TextureSlot::Image(i) => grey(self.bitmaps[i as usize].texels().mean()),
             TextureSlot::Checker(i) => {
                 let [a, b] = self.checkers[i as usize].colors;
                 0.5 * (self.mean(a) + self.mean(b))
@@ -141,30 +162,22 @@ impl Textures {
 
     /// The largest value of every lane.
     pub fn max(&self, slot: TextureSlot) -> Spectrum {
-        self.extreme(slot, Spectrum::lane_max, Bitmap::max)
+        self.extreme(slot, Spectrum::lane_max, Texels::max)
     }
 
     /// The smallest value of every lane.
     pub fn min(&self, slot: TextureSlot) -> Spectrum {
-        self.extreme(slot, Spectrum::lane_min, Bitmap::min)
+        self.extreme(slot, Spectrum::lane_min, Texels::min)
     }
 
-    fn extreme(&self, slot: TextureSlot, join: fn(Spectrum, Spectrum) -> Spectrum, of: fn(&Bitmap) -> Spectrum) -> Spectrum {
+    fn extreme(&self, slot: TextureSlot, join: fn(Spectrum, Spectrum) -> Spectrum, of: fn(&Texels) -> Spectrum) -> Spectrum {
         match slot {
             TextureSlot::Constant(c) => c,
-            TextureSlot::Image(i) => of(&self.bitmaps[i as usize]),
+            TextureSlot::Image(i) => of(self.bitmaps[i as usize].texels()),
             TextureSlot::Checker(i) => {
                 let [a, b] = self.checkers[i as usize].colors;
                 join(self.extreme(a, join, of), self.extreme(b, join, of))
             }
-        }
-    }
-
-    /// The bitmap behind a slot, for tables made from its texels.
-    pub fn bitmap(&self, slot: TextureSlot) -> Option<&Bitmap> {
-        match slot {
-            TextureSlot::Image(i) => self.bitmaps.get(i as usize),
-            _ => None,
         }
     }
 }

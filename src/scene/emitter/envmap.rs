@@ -227,6 +227,11 @@ impl Envmap {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&self.columns.cdf[..]) + size_of_val(&self.columns.guide[..])
     }
+
+    /// Bytes of the image.
+    pub(super) fn image_bytes(&self) -> usize {
+        size_of_val(&self.image.data[..])
+    }
 }
 
 #[inline]

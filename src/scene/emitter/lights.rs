@@ -347,6 +347,12 @@ impl Lights {
         self.emitters.iter().map(tables).sum::<usize>() + std::mem::size_of_val(&self.emitters[..]) + choice
     }
 
+    /// Bytes of the images of emitters.
+    pub fn image_bytes(&self) -> usize {
+        let sky = |e: &Emitter| if let Emitter::Sky(sky) = e { sky.image_bytes() } else { 0 };
+        self.textures.bytes() + self.emitters.iter().map(sky).sum::<usize>()
+    }
+
     #[inline]
     fn chosen(&self, emitter: EmitterId) -> Option<(&Choice, usize)> {
         let i = emitter.0 as usize;

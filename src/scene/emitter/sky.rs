@@ -57,10 +57,18 @@ impl Sky {
         }
     }
 
-    /// Bytes of tables (images are shared with the description).
+    /// Bytes of tables.
     pub(super) fn bytes(&self) -> usize {
         match self {
             Self::Envmap(e) => e.bytes(),
+            _ => 0,
+        }
+    }
+
+    /// Bytes of its image.
+    pub(super) fn image_bytes(&self) -> usize {
+        match self {
+            Self::Envmap(e) => e.image_bytes(),
             _ => 0,
         }
     }
