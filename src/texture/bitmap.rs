@@ -45,16 +45,6 @@ impl Bitmap {
         &self.texels
     }
 
-    /// Interpolation between texels.
-    pub fn filter(&self) -> BitmapFilter {
-        self.filter
-    }
-
-    /// Map of uv before the look-up.
-    pub fn to_uv(&self) -> Affine2 {
-        self.to_uv
-    }
-
     /// The texture at `uv`.
     #[inline]
     pub fn eval(&self, uv: Vec2) -> Spectrum {
