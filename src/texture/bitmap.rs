@@ -12,7 +12,7 @@
 //! </texture>
 //! ```
 
-use super::Texels;
+use super::texels::Texels;
 use crate::describe::{BitmapFilter, BitmapWrap};
 use crate::spectrum::Spectrum;
 use glam::{Affine2, Vec2, Vec4};

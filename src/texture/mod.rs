@@ -9,15 +9,15 @@ mod bitmap;
 mod checkerboard;
 mod texels;
 
-pub use bitmap::Bitmap;
 pub use checkerboard::Checkerboard;
-pub use texels::Texels;
 
 use crate::describe::{ImageDescription, ImageId, Place, Problems, TextureDescription};
 use crate::spectrum::Spectrum;
+use bitmap::Bitmap;
 use glam::{Affine2, Mat2, Mat4, Vec2};
 use std::collections::HashMap;
 use std::sync::Arc;
+use texels::Texels;
 
 /// A texture as its user keeps it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +46,7 @@ impl TextureSlot {
 pub struct Textures {
     bitmaps: Vec<Bitmap>,
     checkers: Vec<Checkerboard>,
-    /// Those of bitmaps.
+    /// Of the images of bitmaps, each made once.
     images: HashMap<ImageId, Arc<Texels>>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Walks look at textures all over, so where an image is larger than the caches, a look-up is a wait for memory. What is read is
 //! kept small and together: images of eight bits have at most 256 distinct numbers, so each number is a byte that stands for it
-//! (a third of the memory, and nothing is lost), and texels lie in squares of four by four, a line of a cache each, so that those
+//! (a colour takes a third of the memory, grey the same, and nothing is lost), and texels lie in squares of four by four, a line of a cache each, so that those
 //! between which is interpolated mostly come at once.
 
 use crate::describe::{Image, ImageDescription};
@@ -147,13 +147,15 @@ impl Texels {
 /// With codes, if there are enough of them.
 fn coded(image: &Image) -> Option<Store> {
     let row = image.width.div_ceil(SIDE) as usize;
-    let mut squares = vec![Square([[0; 4]; (SIDE * SIDE) as usize]); row * image.height.div_ceil(SIDE) as usize];
+    let side = SIDE as usize;
+    let mut squares = vec![];
     let mut codes = Codes::default();
     let channels = image.channels as usize;
     let rows = image.data.chunks_exact(image.width as usize * channels);
     for (y, texels) in rows.enumerate() {
+        // One row of squares at a time: most images with too many numbers show it in the first.
+        squares.resize((y / side + 1) * row, Square([[0; 4]; (SIDE * SIDE) as usize]));
         for (x, texel) in texels.chunks_exact(channels).enumerate() {
-            let side = SIDE as usize;
             let place = &mut squares[y / side * row + x / side].0[y % side * side + x % side];
             for (lane, code) in place[..3].iter_mut().enumerate() {
                 *code = codes.of(texel[lane.min(channels - 1)])?;
