@@ -68,7 +68,7 @@ impl ChainNoise {
             .iter()
             .zip(&bright)
             .filter_map(|((pixel, variance), (mean, _))| {
-                let relative = variance / (mean * mean + dark_squares[pilot.cell(*pixel)? as usize]);
+                let relative = variance / (mean * mean + dark_squares[pilot.picture.cell(*pixel)? as usize]);
                 relative.is_finite().then_some(relative)
             })
             .collect();

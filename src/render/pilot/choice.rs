@@ -141,7 +141,7 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
     // Gathering walks are more than light paths where those are few.
     let part = if plan.light_paths > 0 { candidate.light_paths.clamp(0.125, 1.0) } else { 1.0 };
     let paths = (f64::from(most) * part) as u32;
-    let found = Findings::collected(pilot, plan, &pilot.dark_squares(), (paths, false));
+    let found = Findings::collected(pilot, plan, &pilot.picture.dark_squares(), (paths, false));
     let noise = |unguided: bool| {
         let one = |e: &Evidence| e.square / if unguided { e.unguided.max(LOST) } else { 1.0 };
         candidate.noisy(&found.evidence).map(one).sum::<f64>()
@@ -155,7 +155,7 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
 pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32, chosen: Chosen) -> (Settings, Arc<FirstSeen>) {
     let mut plan = pilot.plan(decisions);
     plan.settings.heuristic = Heuristic::Balance;
-    let dark_squares = pilot.dark_squares();
+    let dark_squares = pilot.picture.dark_squares();
     let mixture = Mixture::of(&plan, pilot.pixels());
     let follows = pilot.settings.follows_chains();
     // No round has samples of chains alone, so none needs to know where they would be.

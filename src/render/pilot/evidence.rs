@@ -1,7 +1,8 @@
 //! What a pilot's walks find and count, for the choice of techniques ([`super::choice`]).
 
 use super::branching::{BranchRays, Branching};
-use super::{Cell, JOB, Pilot};
+use super::picture::Cell;
+use super::{JOB, Pilot};
 use crate::math::random::Family;
 use crate::math::{Random, limit};
 use crate::render::passes::GATHER_AXES;
@@ -197,7 +198,7 @@ impl Findings {
     /// From `paths` light paths and as large a part of the pixels, all joins of `plan` on; with walks in sets if these are wanted.
     pub(super) fn collected(pilot: &Pilot<'_>, mut plan: Plan, dark_squares: &[f64], (paths, with_sets): (u32, bool)) -> Self {
         let share = f64::from(paths) / f64::from(pilot.part(&plan).max(1));
-        let squares = pilot.squares();
+        let squares = pilot.picture.squares();
         let unguided = plan.incident.is_some().then(|| Plan { incident: None, ..plan.clone() });
         let (shot, pieces, subpaths) =
             shot(pilot, (&plan, unguided.as_ref()), &squares, if plan.light_paths > 0 { paths } else { 0 }, share);
@@ -255,7 +256,7 @@ fn shot(
             watch.counts.steps = rays.shoot as f64;
             let seen = watch.witness.seen.iter().zip(&splats.0);
             let tell = |t, cell: Cell| evidence((cx, unguided), t, squares[cell as usize], share);
-            let evidence = seen.filter_map(|(t, raster)| tell(t, pilot.cell(*raster)?)).collect();
+            let evidence = seen.filter_map(|(t, raster)| tell(t, pilot.picture.cell(*raster)?)).collect();
             let found = Found { evidence, counts: watch.counts, ..Found::default() };
             (found, vertices, watch.witness.into_subpaths())
         })
@@ -296,7 +297,7 @@ fn gathered(
                 };
                 let mut tally = Tally { record: &mut (), rays: &mut rays, observe: &mut watch };
                 gather(cx, raster, 1.0, cache, &mut random, &mut tally);
-                let Some(cell) = pilot.cell(raster) else { continue };
+                let Some(cell) = pilot.picture.cell(raster) else { continue };
                 let mut chains = watch.chains.drain(..).peekable();
                 for (i, t) in watch.witness.seen.drain(..).enumerate() {
                     let chain = chains.next_if(|(at, _)| *at == i).map(|(_, share)| share);
