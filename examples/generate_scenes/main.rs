@@ -25,6 +25,7 @@ const FILES: &[Entry] = &[
     ("gems/brilliant.ply", || objects::brilliant().to_ply()),
     ("gems/emerald.ply", || objects::emerald().to_ply()),
     ("gems/backdrop.ply", || objects::backdrop().to_ply()),
+    ("crystal/quartz.ply", || objects::quartz().to_ply()),
     ("wine/glass.ply", || objects::wine_glass().to_ply()),
     ("wine/contact.ply", || objects::wine_contact().to_ply()),
     ("wine/surface.ply", || objects::wine_surface().to_ply()),

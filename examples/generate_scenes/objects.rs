@@ -109,6 +109,20 @@ pub fn emerald() -> Mesh {
     Mesh::convex(&planes, 2.0)
 }
 
+/// A rock crystal, 1 from its axis to each of six sides: each end a pyramid of six faces, the axis 38.2° from them as in quartz.
+pub fn quartz() -> Mesh {
+    const END: f64 = 2.9;
+    const SLOPE: f64 = 90.0 - 38.2;
+    let to_end = END * SLOPE.to_radians().cos();
+    let planes: Vec<_> = (0..6)
+        .flat_map(|k| {
+            let azimuth = 60.0 * f64::from(k);
+            [(facet(azimuth, 90.0), 1.0), (facet(azimuth, SLOPE), to_end), (facet(azimuth, 180.0 - SLOPE), to_end)]
+        })
+        .collect();
+    Mesh::convex(&planes, END)
+}
+
 /// A sheet of paper: a floor that bends up into a wall; x across, the wall at +y.
 pub fn backdrop() -> Mesh {
     let profile =
