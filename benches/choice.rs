@@ -1,6 +1,7 @@
 //! What `auto` chooses against the best fixed set of joins, found by trying all of them at equal time.
 //!
-//! `cargo bench --bench choice -- [--time SECONDS] SCENE.xml ...`. Every set of joins with every number of light paths is
+//! `cargo bench --bench choice -- [--time SECONDS] [--scale FACTOR] SCENE.xml ...`; sides of the pictures are so many times those
+//! of the scene (with half of them and a quarter of the time, the samples are as many, and what `auto` learns from costs it more). Every set of joins with every number of light paths is
 //! rendered for the time (pilot included), the better third again with a second and a third seed, then the best three
 //! beside `auto`, interleaved, with ten fresh seeds. Errors are trimmed relMSE against the reference that `nephroid bench`
 //! makes and keeps beside the scene, its noise subtracted; ratios are of geometric means.
@@ -9,6 +10,7 @@ use nephroid::bench::Subject;
 use nephroid::bench::effort::{Effort, Marks};
 use nephroid::bench::reference::reference;
 use nephroid::bench::statistics::{Interval, geometric_mean, ratio};
+use nephroid::cli::open::resize;
 use nephroid::render::{Budget, Control, Estimator, Options, Render};
 use nephroid::report::Picture;
 use nephroid::report::measures::{distances_and_noise, own};
@@ -106,8 +108,14 @@ impl Trial<'_> {
     }
 }
 
-fn trial(path: &Path, time: Duration) -> Result<f64, String> {
-    let scene = nephroid::load(path, &Default::default()).map_err(|e| e.to_string())?.scene;
+fn trial(path: &Path, time: Duration, scale: f64) -> Result<f64, String> {
+    let mut read = nephroid::io::mitsuba::load(path, &Default::default()).map_err(|e| e.to_string())?;
+    if let Some(sensor) = read.scene.sensors.first_mut() {
+        let side = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
+        let size = [sensor.film.width, sensor.film.height].map(side);
+        resize(&mut sensor.film, size);
+    }
+    let scene = nephroid::finish(read).map_err(|e| e.to_string())?.scene;
     let subject = Subject { name: String::new(), path, scene: &scene };
     let effort =
         Effort { marks: Marks::Time(vec![time]), runs: 1, seed: 0, reference_error: 0.02, reference_time: REFERENCE_RUNS * time };
@@ -127,15 +135,26 @@ fn trial(path: &Path, time: Duration) -> Result<f64, String> {
 
 fn main() {
     let mut time = Duration::from_secs(20);
+    let mut scale = 1.0;
     let mut ratios = vec![];
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     while let Some(argument) = arguments.next() {
-        if argument == "--time" {
-            let seconds = arguments.next().and_then(|t| t.parse().ok()).filter(|t| *t > 0.0 && *t < 1e6);
-            time = Duration::from_secs_f64(seconds.expect("--time takes seconds"));
-            continue;
+        let mut number = |most: f64| {
+            let number = arguments.next().and_then(|t| t.parse().ok()).filter(|t| *t > 0.0 && *t < most);
+            number.unwrap_or_else(|| panic!("{argument} takes a number above 0"))
+        };
+        match argument.as_str() {
+            "--time" => {
+                time = Duration::from_secs_f64(number(1e6));
+                continue;
+            }
+            "--scale" => {
+                scale = number(100.0);
+                continue;
+            }
+            _ => {}
         }
-        match trial(Path::new(&argument), time) {
+        match trial(Path::new(&argument), time, scale) {
             Ok(ratio) => ratios.push(ratio),
             Err(e) => eprintln!("{e}"),
         }
