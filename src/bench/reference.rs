@@ -3,8 +3,12 @@
 //! A reference that is made is bidirectional, with random numbers that no run uses; with merges where every
 //! unbiased join is blind, or so rarely finds the light that `auto` merges (their blur shrinks with the
 //! passes, of which a reference has far more than a run). It is kept as `NAME.reference-HASH.exr`, named by
-//! the content of the scene, and made anew only where more is wanted than it has. Its variance is kept with it: what an error owes to it is subtracted
-//! ([`crate::report::measures::Noise`]), and an error that is mostly that is said to be so.
+//! the content of the scene, and made anew only where more is wanted than it has.
+//!
+//! It is made of two halves with different random numbers, whose difference tells its variance without bias
+//! ([`Picture::of_halves`]). What an error owes to it is subtracted ([`crate::report::measures::Noise`]), and an error that is mostly
+//! that is said to be so. The variance of any other image may be a bound, as that of a film is where samples fill space evenly;
+//! to subtract it would make errors too small, so it is not used.
 
 use super::contender::Stop;
 use super::effort::Effort;
@@ -20,8 +24,10 @@ use crate::transport::settings::Techniques;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Mixed into the seed of a reference; see [`run_seed`](super::race::run_seed) for the others.
-const SEED: u64 = 0x5ef0_a11c_0de5_eed5;
+/// Mixed into the seeds of both halves of a reference; see [`run_seed`](super::race::run_seed) for the others.
+const SEEDS: [u64; 2] = [0x5ef0_a11c_0de5_eed5, 0x0dd_ba11_5eed_0f2a];
+/// Says in a file that its variance is that of [`Picture::of_halves`].
+const VARIANCE: (&str, &str) = ("varianceFrom", "halves");
 
 /// A reference with what is known of it.
 #[derive(Clone, Debug)]
@@ -69,7 +75,10 @@ impl Reference {
 
 fn read(subject: &Subject<'_>, path: &Path) -> Result<Picture, String> {
     let file = read_image(path).map_err(|f| f.to_string())?;
-    let picture = Picture::of_file(&file).ok_or_else(|| format!("{}: no channels R, G, B or Y", path.display()))?;
+    let mut picture = Picture::of_file(&file).ok_or_else(|| format!("{}: no channels R, G, B or Y", path.display()))?;
+    if file.attributes.get(VARIANCE.0).is_none_or(|from| from != VARIANCE.1) {
+        picture.variance = None;
+    }
     let ([w, h], (width, height)) = (size(subject.scene), (picture.width, picture.height));
     if (w, h) != (width, height) {
         return Err(format!("the reference {} has {width} × {height} pixels, the scene {w} × {h}", path.display()));
@@ -106,25 +115,29 @@ fn make(
     mut options: Options,
     stop: Stop<'_>,
 ) -> Result<Option<Reference>, String> {
-    options.settings.seed = effort.seed ^ SEED;
     let begin = Instant::now();
-    let mut render = Render::new(subject.scene, &options).map_err(|e| e.to_string())?;
+    let mut half = |seed: u64| {
+        options.settings.seed = effort.seed ^ seed;
+        Render::new(subject.scene, &options).map_err(|e| e.to_string())
+    };
+    let mut halves = [half(SEEDS[0])?, half(SEEDS[1])?];
     let control = |_: &Progress| if stop() { Control::Stop } else { Control::Continue };
-    let mut passes = 16;
+    let mut passes = 8;
     let picture = loop {
-        let left = effort.reference_time.saturating_sub(begin.elapsed());
-        let budget = Budget { passes: Some(passes), time: Some(left.max(Duration::from_millis(1))) };
-        if render.run(&budget, control) == Outcome::Stopped {
-            return Ok(None);
+        for (render, parts) in halves.iter_mut().zip([2, 1]) {
+            let left = effort.reference_time.saturating_sub(begin.elapsed()) / parts;
+            let budget = Budget { passes: Some(passes), time: Some(left.max(Duration::from_millis(1))) };
+            if render.run(&budget, control) == Outcome::Stopped {
+                return Ok(None);
+            }
         }
-        let picture = Picture::of_film(render.film());
+        let picture = Picture::of_halves(halves[0].film(), halves[1].film());
         let error = picture.variance.as_ref().map_or(f64::INFINITY, |v| relative_variance(v, &picture.mean).sqrt());
-        let done = render.statistics().passes;
-        let out_of_time = begin.elapsed() >= effort.reference_time && done >= 2;
-        if error <= effort.reference_error || out_of_time {
+        if error <= effort.reference_error || begin.elapsed() >= effort.reference_time {
             break picture;
         }
         // As many as the error promises to need, at most twice as many.
+        let done = halves[0].statistics().passes;
         let promised = done as f64 * (error / effort.reference_error).powi(2) * 1.05;
         passes = (promised.min(2.0 * done as f64) as u64).max(done + 1);
     };
@@ -136,11 +149,12 @@ fn make(
         ("estimator", Estimator::Bidirectional.name().into()),
         ("techniques", options.settings.techniques.names()),
         ("renderTime", format!("{seconds:.3}")),
+        (VARIANCE.0, VARIANCE.1.into()),
     ];
     file.attributes.extend(attributes.map(|(k, v)| (k.to_owned(), v)));
     let fault = write_image(path, &file, PngOptions::default()).err();
     let merges = if options.settings.techniques.merge { " with merges" } else { "" };
-    let passes = render.statistics().passes;
+    let passes = picture.samples.unwrap_or(0);
     let origin = format!("made in {seconds:.0} s by the bidirectional estimator{merges}, {passes} samples per pixel");
     let mut reference = Reference::new(picture, origin);
     reference.warning = fault.map(|f| format!("the reference could not be kept: {f}"));

@@ -8,6 +8,7 @@ use nephroid::bench::reference::Reference;
 use nephroid::bench::{Effort, Marks, Subject};
 use nephroid::render::{Budget, Control, Estimator, Options, Render};
 use nephroid::report::Picture;
+use nephroid::report::measures::{distances, relative_variance};
 use nephroid::scene::Scene;
 use std::path::Path;
 use std::time::Duration;
@@ -51,6 +52,28 @@ fn report(scene: &Scene, reference: &Reference, effort: &Effort, estimators: &[E
 
 fn exact(picture: Picture) -> Reference {
     Reference { picture, origin: "known".into(), error: Some(0.0), warning: None }
+}
+
+/// Samples that fill a pixel evenly err less than their variance says; two halves know by how much.
+#[test]
+fn halves_of_a_reference_tell_its_noise() {
+    let scene = scene(STRIPES);
+    let half = |seed, passes| {
+        let mut options = Options::for_scene(&scene, Estimator::Gather);
+        options.settings.seed = seed;
+        let mut render = Render::new(&scene, &options).unwrap();
+        render.run(&Budget::passes(passes), |_| Control::Continue);
+        render.into_film()
+    };
+    // No powers of two: those would leave no error at all.
+    let (a, b) = (half(1, 13), half(2, 39));
+    let (known, picture) = (vec![[1.0; 3]; 1024], Picture::of_halves(&a, &b));
+    assert_eq!(picture.samples, Some(52));
+    let error = distances(&picture.mean, &known).relmse;
+    let told = relative_variance(&picture.variance.unwrap(), &known);
+    assert!((told / error - 1.0).abs() < 0.2, "{told} for {error}");
+    let bound = relative_variance(&b.variance_of_mean(), &known);
+    assert!(bound > 2.0 * distances(&b.mean(), &known).relmse, "{bound}");
 }
 
 /// A pixel is 2 or 0 with probability ½: relative variance 1 / 1.01 per sample, exactly.
