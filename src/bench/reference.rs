@@ -122,7 +122,7 @@ fn make(
     };
     let mut halves = [half(SEEDS[0])?, half(SEEDS[1])?];
     let control = |_: &Progress| if stop() { Control::Stop } else { Control::Continue };
-    let mut passes = 8;
+    let (mut passes, mut before) = (8, None);
     let picture = loop {
         for (render, parts) in halves.iter_mut().zip([2, 1]) {
             let left = effort.reference_time.saturating_sub(begin.elapsed()) / parts;
@@ -133,9 +133,12 @@ fn make(
         }
         let picture = Picture::of_halves(halves[0].film(), halves[1].film());
         let error = picture.variance.as_ref().map_or(f64::INFINITY, |v| relative_variance(v, &picture.mean).sqrt());
-        if error <= effort.reference_error || begin.elapsed() >= effort.reference_time {
+        // What is left of the time may be too short for another pass.
+        let out_of_time = begin.elapsed() >= effort.reference_time || picture.samples == before;
+        if error <= effort.reference_error || out_of_time {
             break picture;
         }
+        before = picture.samples;
         // As many as the error promises to need, at most twice as many.
         let done = halves[0].statistics().passes;
         let promised = done as f64 * (error / effort.reference_error).powi(2) * 1.05;

@@ -241,11 +241,11 @@ impl Job<'_> {
     /// One line that says what runs.
     fn announcement(&self) -> String {
         let passes = self.budget.passes.map(|n| format!("{n} samples per pixel"));
-        let time = self.budget.time.map(|t| format!("{} at most", show_duration(t)));
+        let time = self.budget.time.map(|t| format!("about {}", show_duration(t)));
         let until: Vec<String> = passes.into_iter().chain(time).collect();
         let name = self.estimator.name();
         let joins = self.options.settings.techniques.names();
-        format!("estimator {name} ({joins}), {}, seed {}\n", until.join(", "), self.options.settings.seed)
+        format!("estimator {name} ({joins}), {}, seed {}\n", until.join(" or "), self.options.settings.seed)
     }
 
     /// What a pilot chose.

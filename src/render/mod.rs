@@ -47,7 +47,7 @@ use std::time::{Duration, Instant};
 pub struct Budget {
     /// Passes in all (samples per pixel).
     pub passes: Option<u64>,
-    /// Time from the start of [`Render::run`].
+    /// Time from the start of [`Render::run`]; it ends with the pass that comes closest to it.
     pub time: Option<Duration>,
 }
 
@@ -191,14 +191,14 @@ impl<'a> Render<'a> {
         loop {
             let done = self.film.passes().next();
             let rest = budget.passes.map(|n| n.saturating_sub(done));
-            let out_of_time = budget.time.is_some_and(|t| start.elapsed() >= t);
+            // Nothing couples the passes of pure gathering: several at a time stay in the cache.
+            let group = if self.plan.light_paths == 0 { if budget.time.is_some() { 2 } else { 4 } } else { 1 };
+            let group = rest.map_or(group, |r| r.min(group)).max(1);
+            let out_of_time = budget.time.is_some_and(|t| is_closest(start.elapsed(), self.usual_time(group), t));
             let unbounded = budget.passes.is_none() && budget.time.is_none();
             if rest == Some(0) || (out_of_time && done > 0) || (unbounded && done > 0) {
                 return Outcome::Finished;
             }
-            // Nothing couples the passes of pure gathering: several at a time stay in the cache.
-            let group = if self.plan.light_paths == 0 { if budget.time.is_some() { 2 } else { 4 } } else { 1 };
-            let group = rest.map_or(group, |r| r.min(group)).max(1);
             let before = Instant::now();
             self.run_passes(done..done + group);
             self.statistics.time += before.elapsed();
@@ -213,6 +213,11 @@ impl<'a> Render<'a> {
                 return Outcome::Stopped;
             }
         }
+    }
+
+    /// What so many passes take, by those so far.
+    fn usual_time(&self, passes: u64) -> Duration {
+        self.statistics.time.mul_f64(passes as f64 / self.statistics.passes.max(1) as f64)
     }
 
     /// Renders exactly these passes, which must not be in the film yet (shards of a render).
@@ -258,5 +263,23 @@ impl<'a> Render<'a> {
     /// What was done so far.
     pub fn statistics(&self) -> Statistics {
         Statistics { dropped: self.film.dropped(), cut: self.film.cut(), ..self.statistics }
+    }
+}
+
+/// Whether a render that has taken `elapsed` is no farther from `wanted` than with another `more`.
+fn is_closest(elapsed: Duration, more: Duration, wanted: Duration) -> bool {
+    elapsed + more / 2 >= wanted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_render_ends_with_the_pass_that_comes_closest() {
+        let seconds = Duration::from_secs_f64;
+        let is = |elapsed, pass| is_closest(seconds(elapsed), seconds(pass), seconds(20.0));
+        // 19 or 21.5, 18.5 or 21, and whatever is beyond.
+        assert!(is(19.0, 2.5) && !is(18.5, 2.5) && is(20.0, 0.0) && is(25.0, 2.5) && !is(0.0, 2.5));
     }
 }
