@@ -1,7 +1,8 @@
 //! What `auto` chooses against the best fixed set of joins, found by trying all of them at equal time.
 //!
 //! `cargo bench --bench choice -- [--time SECONDS] [--scale FACTOR] SCENE.xml ...`; sides of the pictures are so many times those
-//! of the scene (with half of them and a quarter of the time, the samples are as many, and what `auto` learns from costs it more). Every set of joins with every number of light paths is
+//! of the scene (with half of them and a quarter of the time, the samples are as many, and what `auto` learns from costs it more).
+//! Every set of joins with every number of light paths is
 //! rendered for the time (pilot included), the better third again with a second and a third seed, then the best three
 //! beside `auto`, interleaved, with ten fresh seeds. Errors are trimmed relMSE against the reference that `nephroid bench`
 //! makes and keeps beside the scene, its noise subtracted; ratios are of geometric means.
@@ -144,19 +145,12 @@ fn main() {
             number.unwrap_or_else(|| panic!("{argument} takes a number above 0"))
         };
         match argument.as_str() {
-            "--time" => {
-                time = Duration::from_secs_f64(number(1e6));
-                continue;
-            }
-            "--scale" => {
-                scale = number(100.0);
-                continue;
-            }
-            _ => {}
-        }
-        match trial(Path::new(&argument), time, scale) {
-            Ok(ratio) => ratios.push(ratio),
-            Err(e) => eprintln!("{e}"),
+            "--time" => time = Duration::from_secs_f64(number(1e6)),
+            "--scale" => scale = number(100.0),
+            path => match trial(Path::new(path), time, scale) {
+                Ok(ratio) => ratios.push(ratio),
+                Err(e) => eprintln!("{e}"),
+            },
         }
     }
     if let Some(mean) = geometric_mean(&ratios) {

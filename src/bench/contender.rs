@@ -113,8 +113,12 @@ impl Contender for Walker<'_> {
             if render.run(&budget, control) == Outcome::Stopped {
                 return Ok(None);
             }
+            let samples = render.statistics().passes;
+            if samples == passes {
+                // What was left of the time is too short for another pass.
+                continue;
+            }
             clock.pause(|seconds| {
-                let samples = render.statistics().passes;
                 run.snapshots.push(Snapshot { seconds, samples, image: render.film().mean() });
             });
         }

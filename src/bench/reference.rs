@@ -8,7 +8,8 @@
 //! It is made of two halves with different random numbers, whose difference tells its variance without bias
 //! ([`Picture::of_halves`]). What an error owes to it is subtracted ([`crate::report::measures::Noise`]), and an error that is mostly
 //! that is said to be so. The variance of any other image may be a bound, as that of a film is where samples fill space evenly;
-//! to subtract it would make errors too small, so it is not used.
+//! to subtract it would make errors too small, so it is not used. (Bounds on means of blocks are: they only widen the interval of the
+//! light that an image has.)
 
 use super::contender::Stop;
 use super::effort::Effort;

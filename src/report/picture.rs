@@ -39,20 +39,22 @@ impl Picture {
     /// The mean of two films of one scene that have no random numbers in common, weighted by their passes n₁ and n₂, each at least one.
     ///
     /// Its variance is (a − b)²·n₁n₂/(n₁ + n₂)²: one degree of freedom for each number, so only means over many pixels say
-    /// something, but these are without bias. What films report of themselves is a bound where their samples fill space evenly.
+    /// something, but these are without bias. What films report of themselves is a bound where their samples fill space evenly; so is
+    /// the variance of blocks here, which is theirs.
     pub fn of_halves(a: &Film, b: &Film) -> Self {
-        let [m, n] = [a, b].map(|film| film.passes().count() as f64);
+        let films = [a, b];
+        let [m, n] = films.map(|film| film.passes().count() as f64);
         let (of_a, of_b) = (m / (m + n), n / (m + n));
-        let pairs = |f: fn(&Film) -> Vec<[f32; 3]>, join: &dyn Fn(f64, f64) -> f64| -> Vec<[f32; 3]> {
-            let join = |(a, b): ([f32; 3], [f32; 3])| std::array::from_fn(|c| join(a[c].into(), b[c].into()) as f32);
-            f(a).into_iter().zip(f(b)).map(join).collect()
+        let join = |[a, b]: &[Vec<[f32; 3]>; 2], f: &dyn Fn(f64, f64) -> f64| -> Vec<[f32; 3]> {
+            a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| f(a[c].into(), b[c].into()) as f32)).collect()
         };
+        let (means, of_blocks) = (films.map(Film::mean), films.map(Film::variance_of_tile_mean));
         Self {
             width: a.width(),
             height: a.height(),
-            mean: pairs(Film::mean, &|a, b| of_a * a + of_b * b),
-            variance: Some(pairs(Film::mean, &|a, b| (a - b) * (a - b) * of_a * of_b)),
-            block_variance: Some(pairs(Film::variance_of_tile_mean, &|a, b| of_a * of_a * a + of_b * of_b * b)),
+            mean: join(&means, &|a, b| of_a * a + of_b * b),
+            variance: Some(join(&means, &|a, b| (a - b) * (a - b) * of_a * of_b)),
+            block_variance: Some(join(&of_blocks, &|a, b| of_a * of_a * a + of_b * of_b * b)),
             samples: Some((m + n) as u64),
         }
     }

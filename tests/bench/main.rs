@@ -123,6 +123,25 @@ fn a_bench_leaves_figures_a_page_and_a_reference() {
 }
 
 #[test]
+fn only_halves_tell_the_noise_of_a_reference() {
+    let room = Room::new();
+    let once = ["--spp", "2", "--runs", "1", "-e", "gather"];
+    let error = |more: &[&str]| {
+        let (code, err) = room.bench(&[&once, more].concat());
+        assert_eq!(code, 0, "{err}");
+        room.report()["scenes"][0]["reference"]["error"].as_f64()
+    };
+    let made = error(&["--reference-time", "1s"]);
+    assert!(made.is_some_and(|e| e > 0.0));
+    assert_eq!(error(&["--reference", room.references()[0].to_str().unwrap()]), made);
+    // A film has a variance, too, but it may be a bound.
+    let film = room.path("film.exr");
+    let mut render = Command::new(env!("CARGO_BIN_EXE_nephroid"));
+    render.arg("render").arg(room.path("ball.xml")).args(["--spp", "4", "--quiet", "-o"]).arg(&film).assert().success();
+    assert_eq!(error(&["--reference", film.to_str().unwrap()]), None);
+}
+
+#[test]
 fn one_run_has_no_ratio() {
     let room = Room::new();
     let arguments = ["--spp", "2", "--runs", "1", "--reference-time", "1s", "-e", "gather,gather"];
