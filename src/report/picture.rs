@@ -36,26 +36,24 @@ impl Picture {
         }
     }
 
-    /// The mean of two films of one scene that have no random numbers in common, weighted by their passes n₁ and n₂, each at least one.
+    /// The mean of two films a and b of one scene that have no random numbers in common, each of at least one pass.
     ///
-    /// Its variance is (a − b)²·n₁n₂/(n₁ + n₂)²: one degree of freedom for each number, so only means over many pixels say
-    /// something, but these are without bias. What films report of themselves is a bound where their samples fill space evenly; so is
-    /// the variance of blocks here, which is theirs.
+    /// Its variance is (a − b)²/4: one degree of freedom for each number, so only means over many pixels say something, but these are
+    /// without bias however fast errors fall with passes. What films report of themselves is a bound where their samples fill space
+    /// evenly; so is the variance of blocks here, which is theirs.
     pub fn of_halves(a: &Film, b: &Film) -> Self {
-        let films = [a, b];
-        let [m, n] = films.map(|film| film.passes().count() as f64);
-        let (of_a, of_b) = (m / (m + n), n / (m + n));
-        let join = |[a, b]: &[Vec<[f32; 3]>; 2], f: &dyn Fn(f64, f64) -> f64| -> Vec<[f32; 3]> {
-            a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| f(a[c].into(), b[c].into()) as f32)).collect()
+        let halves = [a, b];
+        let join = |[a, b]: &[Vec<[f32; 3]>; 2], f: &dyn Fn(f32, f32) -> f32| -> Vec<[f32; 3]> {
+            a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| f(a[c], b[c]))).collect()
         };
-        let (means, of_blocks) = (films.map(Film::mean), films.map(Film::variance_of_tile_mean));
+        let (means, of_blocks) = (halves.map(Film::mean), halves.map(Film::variance_of_tile_mean));
         Self {
             width: a.width(),
             height: a.height(),
-            mean: join(&means, &|a, b| of_a * a + of_b * b),
-            variance: Some(join(&means, &|a, b| (a - b) * (a - b) * of_a * of_b)),
-            block_variance: Some(join(&of_blocks, &|a, b| of_a * of_a * a + of_b * of_b * b)),
-            samples: Some((m + n) as u64),
+            mean: join(&means, &|a, b| (a + b) / 2.0),
+            variance: Some(join(&means, &|a, b| (a - b) * (a - b) / 4.0)),
+            block_variance: Some(join(&of_blocks, &|a, b| (a + b) / 4.0)),
+            samples: Some(halves.iter().map(|film| film.passes().count()).sum()),
         }
     }
 
