@@ -516,6 +516,10 @@ fn a_plan_is_written_once_and_read_from_then_on() {
     let (code, _, err) = render("b.exr", &[]);
     assert!(code == 0 && !err.contains("chosen in"), "{err}");
     assert_eq!(image("b.exr").attributes.get("techniques").map(String::as_str), Some("hit"));
+    let uneven = r#"{"techniques":"hit, nee","light_paths":0,"connections":1,"merge_radius":0.0,"faint_branches":0.01,"chain_samples":1,"guided_gathering":false,"samples":["13","21"]}"#;
+    std::fs::write(&plan, uneven).expect("written");
+    assert_eq!(render("d.exr", &[]).0, 0);
+    assert_eq!(image("d.exr").attributes.get("plan").map(String::as_str), Some(uneven));
     for (text, what) in [
         (r#"{"techniques": "hit, leap", "light_paths": 0, "connections": 1, "merge_radius": 0}"#, "unknown technique `leap`"),
         (r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": -1}"#, "merge_radius"),
@@ -524,6 +528,11 @@ fn a_plan_is_written_once_and_read_from_then_on() {
             "faint_branches",
         ),
         (r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": 0, "chain_samples": 0}"#, "chain_samples"),
+        (
+            r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": 0, "samples": ["12", "1"]}"#,
+            "rows of digits",
+        ),
+        (r#"{"techniques": "hit", "light_paths": 0, "connections": 1, "merge_radius": 0, "samples": ["10"]}"#, "from 1 to 9"),
         (r#"{"techniques": "hit", "light_paths": 0}"#, "missing field"),
         (r#"{"techniques": "splat", "light_paths": 4294967295, "connections": 1, "merge_radius": 0}"#, "--max-memory"),
         ("", "EOF"),

@@ -15,6 +15,8 @@ mod scenes;
 #[path = "physics/support.rs"]
 #[allow(dead_code)]
 mod support;
+#[path = "physics/uneven.rs"]
+mod uneven;
 
 use nephroid::proof::adjoint::{ALPHA, Effort as Draws, adjoint};
 use nephroid::proof::residual;
@@ -23,6 +25,7 @@ use nephroid::report::agreement::agreement;
 use nephroid::transport::class::PathFilter;
 use nephroid::transport::mutant::{Mutant, plant};
 use nephroid::transport::settings::{FAINT, NO_BRANCHES, NO_SPLITS, Settings, Techniques};
+use std::sync::Arc;
 use support::{Effort, pictures, scene, seed, series};
 
 /// A mistake is planted for the whole process.
@@ -267,6 +270,23 @@ fn planted_mistakes_double_lamps() {
         agreement(&hits, &both).p
     });
     println!("LampTwice: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
+    assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
+}
+
+/// `samples::more_walks_keep_every_expectation` notices walks that do not know how many they are.
+#[test]
+fn planted_mistakes_weigh_walks_of_a_pixel_as_one() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let world = scene(&scenes::named(dir.path(), "diffuse box"));
+    let even = uneven::drawn(&world, "splat,hit", &Arc::default(), 0);
+    let [sound, mistaken] = [None, Some(Mutant::SampleMap)].map(|m| {
+        plant(m);
+        let uneven = uneven::drawn(&world, "splat,hit", &uneven::checkered(), 50);
+        plant(None);
+        agreement(&even, &uneven).p
+    });
+    println!("SampleMap: p = {sound:.2e} without, {mistaken:.2e} with the mistake");
     assert!(sound > 1e-5 && mistaken < 1e-5, "{sound} {mistaken}");
 }
 

@@ -255,7 +255,7 @@ impl<'a> Walked<'a> {
         let cx = Context::new(self.scene, &self.plan, self.passes);
         let (found, mut vertices, mut rays) = (Cell::new(None), Vec::new(), RayCounts::default());
         let mut watch = Watch::new(&[]);
-        let mut at = At { walked: self, pixel: 0, found: &found };
+        let mut at = At { walked: self, pixel: 0, part: 1.0, found: &found };
         let paths = job * SHOOT_JOB..(job + 1).saturating_mul(SHOOT_JOB).min(self.plan.light_paths);
         let mut observe = Observing { watch: &mut watch, found: &found };
         let mut tally = Tally { record: &mut at, rays: &mut rays, observe: &mut observe };
@@ -273,13 +273,16 @@ impl<'a> Walked<'a> {
         for (x, y, _) in self.layout.tile_rect(index).pixels() {
             let (px, py) = (self.crop[0] + x, self.crop[1] + y);
             let id = u64::from(py) * u64::from(self.scene.film.width) + u64::from(px);
-            let mut random = pixel_random(&self.plan, id, self.passes);
-            let (offset, weight) = self.filter.sample_offset(random.axis2());
-            let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
-            let mut at = At { walked: self, pixel: self.layout.pixel(x, y), found: &found };
-            let mut observe = Observing { watch: &mut watch, found: &found };
-            let mut tally = Tally { record: &mut at, rays: &mut rays, observe: &mut observe };
-            gather(cx, raster, weight, cache, &mut random, &mut tally);
+            let samples = self.plan.settings.samples.at((x as i32, y as i32));
+            for i in 0..u64::from(samples) {
+                let mut random = pixel_random(&self.plan, id, self.passes * u64::from(samples) + i);
+                let (offset, weight) = self.filter.sample_offset(random.axis2());
+                let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
+                let mut at = At { walked: self, pixel: self.layout.pixel(x, y), part: 1.0 / samples as f32, found: &found };
+                let mut observe = Observing { watch: &mut watch, found: &found };
+                let mut tally = Tally { record: &mut at, rays: &mut rays, observe: &mut observe };
+                gather(cx, raster, weight, cache, &mut random, &mut tally);
+            }
             watch.found.drain(..).for_each(|f| tile.add(&f));
         }
     }
@@ -343,12 +346,14 @@ fn name_of(technique: Technique) -> String {
 struct At<'a> {
     walked: &'a Walked<'a>,
     pixel: u32,
+    /// Of what walks of the pixel find.
+    part: f32,
     found: &'a Cell<Option<(u32, f32)>>,
 }
 
 impl Record for At<'_> {
     fn gathered(&mut self, c: Contribution) {
-        self.found.set(Some((self.pixel, c.value.mean())));
+        self.found.set(Some((self.pixel, self.part * c.value.mean())));
     }
     fn splatted(&mut self, raster: Vec2, random: &mut Random, c: Contribution) {
         let splat = self.walked.filter.splat_pixel(raster, random.unit2());

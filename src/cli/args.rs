@@ -315,6 +315,9 @@ pub struct TransportArgs {
     /// Let a walk through glass choose at random which way it looks for lamps, instead of following all
     #[arg(long)]
     pub no_branching: bool,
+    /// The same number of gathering walks for all pixels, not more where a pilot found that they vary more
+    #[arg(long)]
+    pub no_adaptive: bool,
     /// How walks draw: evenly spread over their first decisions (the variance that the image reports is
     /// then an upper bound), or independently of each other
     #[arg(long, value_enum, default_value_t, value_name = "NAME")]

@@ -3,9 +3,11 @@
 use super::Failure;
 use crate::io::fault::{Fault, reason};
 use crate::io::write::write_atomic;
+use crate::transport::sample_map::SampleMap;
 use crate::transport::settings::{FAINT, Plan, Settings, Techniques};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// A longer file is no plan.
 const MOST_BYTES: u64 = 65_536;
@@ -34,6 +36,9 @@ struct PlanFile {
     /// Gathering walks go where a pilot found that light comes from.
     #[serde(default)]
     guided_gathering: bool,
+    /// Gathering walks of pixels in a pass, a digit for each cell of a grid over the picture, in rows; none: one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    samples: Vec<String>,
 }
 
 fn faint() -> f32 {
@@ -42,6 +47,16 @@ fn faint() -> f32 {
 
 fn one() -> u32 {
     1
+}
+
+/// Of a row of numbers.
+fn digits(row: &[u8]) -> String {
+    row.iter().map(|n| char::from(b'0' + n)).collect()
+}
+
+/// Of a row of digits.
+fn numbers(row: &str) -> Option<Vec<u8>> {
+    row.chars().map(|c| c.to_digit(10).and_then(|n| u8::try_from(n).ok())).collect()
 }
 
 /// As text, for files and for images' attributes.
@@ -55,6 +70,7 @@ pub fn text(plan: &Plan) -> String {
         faint_branches: s.faint,
         chain_samples: s.chain_samples,
         guided_gathering: plan.incident.is_some(),
+        samples: s.samples.rows().map(digits).collect(),
     };
     serde_json::to_string(&file).unwrap_or_default()
 }
@@ -84,6 +100,11 @@ pub fn read(path: &Path, settings: &mut Settings) -> Result<bool, Failure> {
     if !(1..=MOST_CHAIN_SAMPLES).contains(&file.chain_samples) {
         return Err(wrong(format!("chain_samples is {}, expected 1 to {MOST_CHAIN_SAMPLES}", file.chain_samples)));
     }
+    let samples = file.samples.iter().map(|row| numbers(row)).collect::<Option<Vec<_>>>();
+    let Some(samples) = samples.and_then(|rows| SampleMap::from_rows(&rows)) else {
+        return Err(wrong("samples are rows of digits from 1 to 9, all of the same length".into()));
+    };
+    settings.samples = Arc::new(samples);
     settings.techniques = techniques;
     settings.light_paths = (file.light_paths > 0).then_some(file.light_paths);
     settings.connections = file.connections;

@@ -157,6 +157,7 @@ fn options(opened: &Opened, args: &RenderArgs) -> (Estimator, Options) {
     s.connections = t.connections;
     s.guided = !t.no_guide;
     s.guided_gathering = t.guide_gathering;
+    s.adaptive = !t.no_adaptive;
     s.faint = if t.no_branching { NO_BRANCHES } else { FAINT };
     s.stratified = t.sampler == SamplerName::Stratified;
     s.seed = args.seed.unwrap_or(opened.scene.seed);

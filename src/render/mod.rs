@@ -63,6 +63,9 @@ impl Budget {
     }
 }
 
+/// With so many pairs of passes to the time of a render, it ends with a pair.
+const PAIRS_IN_TIME: u32 = 8;
+
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
@@ -192,7 +195,13 @@ impl<'a> Render<'a> {
             let done = self.film.passes().next();
             let rest = budget.passes.map(|n| n.saturating_sub(done));
             // Nothing couples the passes of pure gathering: several at a time stay in the cache.
-            let group = if self.plan.light_paths == 0 { if budget.time.is_some() { 2 } else { 4 } } else { 1 };
+            let group = match budget.time {
+                None if self.plan.light_paths == 0 => 4,
+                Some(_) if self.plan.light_paths == 0 => 2,
+                // Points of a sequence come in pairs: an odd one out may bring more noise than it takes.
+                Some(t) if done > 0 && PAIRS_IN_TIME * self.usual_time(2) <= t => 2 - done % 2,
+                _ => 1,
+            };
             let group = rest.map_or(group, |r| r.min(group)).max(1);
             let out_of_time = budget.time.is_some_and(|t| is_closest(start.elapsed(), self.usual_time(group), t));
             let unbounded = budget.passes.is_none() && budget.time.is_none();

@@ -210,28 +210,33 @@ impl Gathering<'_> {
         1.0 / self.plan.chain_samples() as f32
     }
 
-    /// One sample of a pixel of the crop window: where `taps` say, or by the filter.
+    /// The samples of a pixel of the crop window in a pass, each of which counts its part: where `taps` say, or by the filter.
     #[inline]
-    fn sample(
+    fn samples(
         &self,
         cx: Context<'_>,
         (pixel, pass): ((i32, i32), u64),
         taps: Option<&Taps>,
         rays: &mut RayCounts,
-        found: impl FnMut(&Contribution),
+        mut found: impl FnMut(&Contribution),
     ) {
         let (corner, id) = self.pixel(pixel);
-        let mut random = pixel_random(self.plan, id, pass);
-        let (raster, weight) = match taps {
-            Some(taps) => (corner + 0.5 + taps.offset, 1.0),
-            None => self.place(corner, &mut random),
-        };
-        let mut tally = Tally { record: &mut PixelRecord(found), rays, observe: &mut () };
-        let (r, t) = (&mut random, &mut tally);
-        match self.plan.settings.coupling {
-            Coupling::All => gather(cx, raster, weight, self.cache, r, t),
-            Coupling::Specular => recursive(cx, raster, weight, true, r, t),
-            Coupling::None { shadows } => recursive(cx, raster, weight, shadows, r, t),
+        let samples = self.plan.settings.samples.at(pixel);
+        let part = 1.0 / samples as f32;
+        let mut record = PixelRecord(|c: &Contribution| found(&Contribution { value: c.value * part, ..*c }));
+        for i in 0..u64::from(samples) {
+            let mut random = pixel_random(self.plan, id, pass * u64::from(samples) + i);
+            let (raster, weight) = match taps {
+                Some(taps) => (corner + 0.5 + taps.offset, 1.0),
+                None => self.place(corner, &mut random),
+            };
+            let mut tally = Tally { record: &mut record, rays: &mut *rays, observe: &mut () };
+            let (r, t) = (&mut random, &mut tally);
+            match self.plan.settings.coupling {
+                Coupling::All => gather(cx, raster, weight, self.cache, r, t),
+                Coupling::Specular => recursive(cx, raster, weight, true, r, t),
+                Coupling::None { shadows } => recursive(cx, raster, weight, shadows, r, t),
+            }
         }
     }
 
@@ -293,7 +298,7 @@ fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &Li
                         let (more, part) = gathering.chains((x, y), shared.is_some());
                         let cx = cx.with_chain_part(part);
                         if shared.is_none() {
-                            gathering.sample(cx, (pixel, pass), None, &mut rays, &mut found);
+                            gathering.samples(cx, (pixel, pass), None, &mut rays, &mut found);
                         }
                         gathering.more_chains(cx, (pixel, pass), more, &mut rays, &mut found);
                     }
@@ -348,7 +353,7 @@ fn share<S: Sink>(gathering: &Gathering<'_>, cx: Context<'_>, sharing: Sharing, 
     let of_tile = |tile| {
         let (mut found, mut rays) = (S::nothing(sharing, tile, exponent), RayCounts::default());
         for pixel in sharing.share(tile).pixels() {
-            gathering.sample(cx, (pixel, pass), Some(&taps), &mut rays, |c| S::find(&mut found, pixel, &S::keep(c)));
+            gathering.samples(cx, (pixel, pass), Some(&taps), &mut rays, |c| S::find(&mut found, pixel, &S::keep(c)));
         }
         (found, rays)
     };

@@ -39,7 +39,7 @@ pub fn gather<R: Record, O: Observe>(
     tally: &mut Tally<'_, R, O>,
 ) {
     let start = cx.scene.sensor.sample_ray(raster, random.axis2());
-    follow(cx, start, weight, lights, random, tally);
+    follow(cx.at(raster), start, weight, lights, random, tally);
 }
 
 /// The same along a given ray: with hits and next events alone it may start anywhere, and estimates
@@ -116,7 +116,7 @@ fn go_on<R: Record, O: Observe>(
         tally.observe.arrived(&surface);
         let vertex = Vertex::gathering(scene, plan.incident(), surface, -ray.d);
         let count = if walk.length == 0 {
-            plan.n
+            cx.n
         } else if walk.delta {
             0.0
         } else {

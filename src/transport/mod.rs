@@ -19,6 +19,7 @@
 //! - [`chain`], [`branch`]: Dirac events followed in all directions, beside a gathering walk.
 //! - [`split`]: a gathering walk that goes both ways where it sees glass.
 //! - [`incident`]: where light comes from, as learned, for gathering walks to go there.
+//! - [`sample_map`]: how many gathering walks each pixel has in a pass.
 //! - [`cache`], [`merge`]: light vertices kept for connections and merges.
 //! - [`mod@reference`]: the same weights the slow way, for tests.
 
@@ -36,6 +37,7 @@ pub mod mis;
 pub mod mutant;
 pub mod recursive;
 pub mod reference;
+pub mod sample_map;
 pub mod settings;
 pub mod shoot;
 pub mod split;

@@ -34,6 +34,8 @@ pub enum Mutant {
     SplitInFull = 13,
     /// A merge that is met by chance counts in full however many it finds at once.
     Crowd = 14,
+    /// Gathering walks do not know that their pixel has several in a pass.
+    SampleMap = 15,
 }
 
 #[cfg(feature = "mutants")]

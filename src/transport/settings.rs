@@ -7,7 +7,9 @@ use super::first_seen::FirstSeen;
 use super::incident::Incident;
 use super::mis::Heuristic;
 use super::mutant::{Mutant, planted};
+use super::sample_map::SampleMap;
 use crate::scene::emitter::Guide;
+use glam::Vec2;
 use std::sync::Arc;
 
 /// Joins that are allowed.
@@ -149,6 +151,10 @@ pub struct Settings {
     /// Where branches are followed and a gathering walk that came by Dirac events alone has two ways on, it takes both if the
     /// fainter carries at least this share of the pixel ([`super::split`]); [`NO_SPLITS`]: one at random.
     pub faintest_split: f32,
+    /// Where techniques are chosen, the pilot may give pixels where walks vary more of them.
+    pub adaptive: bool,
+    /// Gathering walks of each pixel in a pass.
+    pub samples: Arc<SampleMap>,
     /// Classes of paths that count.
     pub paths: PathFilter,
     /// Walks fill the space of their first decisions evenly.
@@ -192,6 +198,8 @@ impl Default for Settings {
             faint: FAINT,
             chain_samples: 1,
             faintest_split: NO_SPLITS,
+            adaptive: true,
+            samples: Arc::default(),
             paths: PathFilter::default(),
             stratified: true,
             seed: 0,
@@ -206,7 +214,7 @@ pub struct Plan {
     pub settings: Settings,
     /// Light paths of a pass; 0 where nothing shoots.
     pub light_paths: u32,
-    /// N of the weights: light paths per camera sample, 0 where splats are off.
+    /// N of the weights: light paths per camera sample where pixels have one in a pass ([`Plan::n_at`]), 0 where splats are off.
     pub n: f32,
     /// c of the weights: connections per camera sample and light vertex, with the mean number of
     /// light vertices of the pilot (not this pass's own, which depends on its light paths).
@@ -269,6 +277,12 @@ impl Plan {
             incident: None,
             settings,
         }
+    }
+
+    /// N of the weights where a path meets the film.
+    #[inline]
+    pub fn n_at(&self, raster: Vec2) -> f32 {
+        self.n / self.settings.samples.at_raster(raster) as f32
     }
 
     /// Learned densities of gathering.

@@ -184,7 +184,7 @@ fn splat<R: Record, O: Observe>(
     let Some(k) = vertex.kernel(EQUATION, c.w) else { return };
     let h = plan.settings.heuristic;
     let g1 = c.g_dir * k.cos_g * c.inv_d2;
-    let weight = mis::splat(h, plan.n, g1, partial.at(h, k.p_w_rev));
+    let weight = mis::splat(h, plan.n_at(c.raster), g1, partial.at(h, k.p_w_rev));
     let value = walk.throughput * k.value * (c.inv_d2 * c.g_dir * plan.inv_light_paths * weight);
     if value.is_black() {
         return;

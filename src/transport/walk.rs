@@ -17,7 +17,7 @@ use crate::scene::emitter::{Emission, EmitterPoint, NextEvent};
 use crate::scene::geometry::{End, Ray, offset_origin};
 use crate::scene::{EmitterId, Scene, Surface};
 use crate::spectrum::Spectrum;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// What a walk needs to know of the world around it.
 #[derive(Clone, Copy)]
@@ -32,6 +32,8 @@ pub struct Context<'a> {
     pub eta: Eta<f32>,
     /// Light vertices in the radius of this pass where merges are met by chance, for one in the largest of the first.
     crowded: f32,
+    /// N of the weights for a gathering walk ([`Plan::n_at`]).
+    pub n: f32,
     /// Part of what comes along chains of Dirac events (E S* L) that a sample counts: where several samples of chains
     /// belong to one gathering walk ([`super::chain::sample`]), one by their number.
     pub chain_part: f32,
@@ -44,7 +46,7 @@ impl<'a> Context<'a> {
         let clear = plan.light_paths as f32 * std::f32::consts::PI * merge_radius2;
         let eta = Eta { clear, by_chance: clear * plan.by_chance };
         let crowded = plan.by_chance * merge_radius2 / plan.merge_radius(0).powi(2).max(f32::MIN_POSITIVE);
-        Self { scene, plan, merge_radius2, eta, crowded, chain_part: 1.0 }
+        Self { scene, plan, merge_radius2, eta, crowded, n: plan.n, chain_part: 1.0 }
     }
 
     /// The same for another plan, of the same radius.
@@ -75,6 +77,12 @@ impl<'a> Context<'a> {
     pub fn merge_count(&self, p: Vec3, clear: bool) -> f32 {
         let crowd = if clear || planted(Mutant::Crowd) { 0.0 } else { self.crowd(p) };
         self.eta.count(clear, crowd)
+    }
+
+    /// The same for a gathering walk from a point of the film.
+    #[inline]
+    pub fn at(self, raster: Vec2) -> Self {
+        Self { n: if planted(Mutant::SampleMap) { self.plan.n } else { self.plan.n_at(raster) }, ..self }
     }
 
     /// The same where a sample counts this part of what comes along chains.

@@ -103,8 +103,8 @@ impl Candidate {
         Self { light_paths, next_event: t.next_event, connect: t.connect, merge: t.merge }
     }
 
-    /// Per pixel.
-    fn cost(&self, found: &Findings, mixture: &Mixture) -> f64 {
+    /// Of gathering and of shooting, per pixel.
+    fn costs(&self, found: &Findings, mixture: &Mixture) -> [f64; 2] {
         let n = mixture.times(self.light_paths);
         let merges = mixture.shrunk * (n * found.merges.clear + mixture.by_chance(n) * found.merges.by_chance);
         let (eye, light) = (&found.eye, &found.light);
@@ -112,11 +112,8 @@ impl Candidate {
         let on = |b: bool, cost: f64| if b { cost } else { 0.0 };
         let at_eye = on(self.next_event, c.next_event) + on(self.connect, c.connect);
         let at_light = c.splat + on(self.connect, c.keep);
-        c.gather_walk
-            + c.gather_step * eye.steps
-            + at_eye * eye.ends
-            + on(self.merge, c.merge * merges)
-            + self.light_paths * (c.shoot_walk + c.shoot_step * light.steps + at_light * light.ends)
+        let gathering = c.gather_walk + c.gather_step * eye.steps + at_eye * eye.ends + on(self.merge, c.merge * merges);
+        [gathering, self.light_paths * (c.shoot_walk + c.shoot_step * light.steps + at_light * light.ends)]
     }
 
     fn settings(&self, settings: &Settings, pixels: u32) -> Settings {
@@ -133,6 +130,17 @@ impl Candidate {
     }
 }
 
+/// What was chosen.
+pub(super) struct Best {
+    pub(super) settings: Settings,
+    /// What pixels see first.
+    pub(super) first_seen: Arc<FirstSeen>,
+    /// Of a pass, the mean over pixels.
+    pub(super) noise_of_splats: f64,
+    /// Of gathering and of shooting, per pixel.
+    pub(super) costs: [f64; 2],
+}
+
 /// Whether gathering walks should go where light was found to come from, by at most so many walks of either kind that do.
 pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool {
     let mut plan = pilot.plan(decisions);
@@ -146,13 +154,13 @@ pub(super) fn goes(pilot: &Pilot<'_>, decisions: &Decisions, most: u32) -> bool 
         let one = |e: &Evidence| e.square / if unguided { e.unguided.max(LOST) } else { 1.0 };
         candidate.noisy(&found.evidence).map(one).sum::<f64>()
     };
-    let cost = candidate.cost(&found, &mixture);
+    let cost: f64 = candidate.costs(&found, &mixture).iter().sum();
     let more = COSTS.directions * (found.eye.ends + candidate.light_paths * found.light.ends);
     noise(false) * (cost + more) * GUIDE_MUST_WIN < noise(true) * cost
 }
 
-/// The settings of the best candidate, judged on `paths` light paths and as large a part of the pixels; and what pixels see first.
-pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32, chosen: Chosen) -> (Settings, Arc<FirstSeen>) {
+/// The best candidate, judged on `paths` light paths and as large a part of the pixels.
+pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32, chosen: Chosen) -> Best {
     let mut plan = pilot.plan(decisions);
     plan.settings.heuristic = Heuristic::Balance;
     let dark_squares = pilot.picture.dark_squares();
@@ -175,18 +183,21 @@ pub(super) fn choose(pilot: &Pilot<'_>, decisions: &Decisions, paths: u32, chose
         let blurs = if c.merge { MERGE_MUST_WIN } else { 1.0 };
         let early = if chosen == Chosen::ForRounds && c.light_paths == 0.0 { NO_LESSONS_MUST_WIN } else { 1.0 };
         let lacks = if c.next_event && c.connect { 1.0 } else { LESS_MUST_WIN };
-        let (noise, cost) = (c.noise(&found, &mixture), c.cost(&found, &mixture));
+        let (noise, cost) = (c.noise(&found, &mixture), c.costs(&found, &mixture).iter().sum::<f64>());
         ways.iter().map(move |(b, samples)| {
             let noise = noise + chains.noise(b, *samples);
             let cost = cost + COSTS.branch * b.rays + chains.cost(*samples, COSTS.look, COSTS.branch);
             (noise * cost * blurs * lacks * early, c, (b.faint, *samples))
         })
     });
-    let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
-    let with = |(_, c, (faint, chain_samples)): (f64, &Candidate, _)| Settings {
-        faint,
-        chain_samples,
-        ..c.settings(pilot.settings, pixels)
-    };
-    (best.map_or_else(|| pilot.settings.clone(), with), Arc::new(first_seen))
+    let first_seen = Arc::new(first_seen);
+    match judged.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((_, best, (faint, chain_samples))) => Best {
+            settings: Settings { faint, chain_samples, ..best.settings(pilot.settings, pixels) },
+            first_seen,
+            noise_of_splats: best.noise_of_splats(&found, &mixture) / f64::from(pixels),
+            costs: best.costs(&found, &mixture),
+        },
+        None => Best { settings: pilot.settings.clone(), first_seen, noise_of_splats: 0.0, costs: [1.0, 0.0] },
+    }
 }

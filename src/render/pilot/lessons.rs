@@ -1,6 +1,7 @@
 //! What the rounds of a pilot have taught so far, and what was decided on the strength of it.
 
 use super::choice::{self, Chosen};
+use super::survey::Beside;
 use super::{CHOICE, Decisions, JOB, JUDGES, Pilot, part_by_chance};
 use crate::scene::Scene;
 use crate::scene::emitter::guide::Guide;
@@ -17,13 +18,23 @@ pub(super) struct Lessons<'a> {
     incident: Vec<Lesson>,
     /// Part of the light paths that were of use, by round.
     of_use: Vec<f64>,
+    /// What light paths bring and take in what was chosen.
+    beside: Beside,
 }
 
 impl<'a> Lessons<'a> {
     /// Of no round, with what is decided without any.
     pub(super) fn new(scene: &'a Scene, decisions: Decisions) -> Self {
         let asked = decisions.settings.clone();
-        Self { scene, asked, decisions, guide: Guide::new(&scene.lights), incident: vec![], of_use: vec![] }
+        Self {
+            scene,
+            asked,
+            decisions,
+            guide: Guide::new(&scene.lights),
+            incident: vec![],
+            of_use: vec![],
+            beside: Beside::default(),
+        }
     }
 
     pub(super) fn shoots(&self) -> bool {
@@ -43,8 +54,14 @@ impl<'a> Lessons<'a> {
     /// Chooses among all that was asked for, by what is known; `paths` light paths judge, or fewer.
     pub(super) fn choose(&mut self, pilot: &Pilot<'_>, paths: u32, chosen: Chosen) {
         let all = Decisions { settings: self.asked.clone(), ..self.decisions.clone() };
-        let (settings, first_seen) = choice::choose(pilot, &all, paths.min(JUDGES), chosen);
-        self.decisions = Decisions { settings, first_seen, ..all };
+        let best = choice::choose(pilot, &all, paths.min(JUDGES), chosen);
+        self.decisions = Decisions { settings: best.settings, first_seen: best.first_seen, ..all };
+        self.beside = Beside { noise: best.noise_of_splats, cost: best.costs[1] / best.costs[0] };
+    }
+
+    /// Gives more walks to pixels where they vary more.
+    pub(super) fn survey(&mut self, pilot: &Pilot<'_>) {
+        self.decisions.settings.samples = Arc::new(pilot.survey(&self.decisions, self.beside));
     }
 
     /// What is decided in the end: nothing about light paths where none are shot.

@@ -18,6 +18,7 @@ mod lessons;
 mod noise;
 mod picture;
 mod round;
+mod survey;
 mod trail;
 
 use crate::math::Random;
@@ -26,6 +27,7 @@ use crate::scene::emitter::guide::Guide;
 use crate::transport::crowd::Crowds;
 use crate::transport::first_seen::FirstSeen;
 use crate::transport::incident::Incident;
+use crate::transport::sample_map::SampleMap;
 use crate::transport::settings::{Coupling, Plan, Settings, Techniques};
 use choice::Chosen;
 use glam::Vec2;
@@ -124,6 +126,9 @@ fn measured(scene: &Scene, settings: &Settings, crop: [u32; 4]) -> Decisions {
     if settings.automatic {
         // Once more, knowing what light paths find by now; then a round counts for what is chosen.
         so_far.choose(&pilot, JUDGES, Chosen::ForRender);
+        if settings.adaptive {
+            so_far.survey(&pilot);
+        }
         if so_far.shoots() {
             let paths = so_far.paths(&pilot, last / 4);
             so_far.learn(&mut pilot, (ROUNDS + MORE_ROUNDS, paths), goes);
@@ -150,7 +155,8 @@ impl Decisions {
     pub fn plan(&self, scene: &Scene, crop: [u32; 4]) -> Plan {
         let pixels = crop[2].saturating_mul(crop[3]);
         let film = scene.film.width.saturating_mul(scene.film.height);
-        let settings = Settings { merge_radius: Some(self.merge_radius), ..self.settings.clone() };
+        let samples = Arc::new(SampleMap::clone(&self.settings.samples).over(crop));
+        let settings = Settings { merge_radius: Some(self.merge_radius), samples, ..self.settings.clone() };
         let incident = self.incident.clone();
         Plan {
             guide: self.guide.clone(),
@@ -174,6 +180,7 @@ impl Decisions {
         bytes.extend(self.settings.faint.to_bits().to_le_bytes());
         bytes.extend(self.settings.chain_samples.to_le_bytes());
         bytes.push(u8::from(self.settings.guided_gathering));
+        self.settings.samples.rows().for_each(|row| bytes.extend(row));
         bytes
     }
 }

@@ -90,30 +90,10 @@ impl Pairs {
 impl Candidate {
     /// Of a pass, from what the mixture of all joins found.
     pub(super) fn noise(&self, found: &Findings, mixture: &Mixture) -> f64 {
-        let on = |b: bool| if b { 1.0 } else { 0.0 };
-        let n = mixture.times(self.light_paths);
-        // Where merges find a crowd at once, more light paths make it larger, not more often found.
-        let chance = mixture.by_chance(n);
-        let merges = |e: &Evidence| {
-            let by_chance = chance * (1.0 + e.crowd) / (1.0 + chance * e.crowd);
-            on(self.merge) * mixture.shrunk * (n * (1.0 - e.by_chance) + by_chance * e.by_chance)
-        };
-        let numbers = |e: &Evidence| {
-            Technique::ALL.map(|technique| match technique {
-                Technique::Hit => 1.0,
-                Technique::NextEvent => on(self.next_event),
-                Technique::Connect => on(self.connect),
-                Technique::Splat => n,
-                Technique::Merge => merges(e),
-            })
-        };
-        let rho_of = |e: &Evidence, numbers: [f64; Technique::ALL.len()]| {
-            e.shares.iter().zip(numbers).map(|(r, n)| r * n).sum::<f64>().max(LOST)
-        };
         let mut pairs = Pairs::default();
         for e in self.noisy(&found.sets) {
-            let numbers = numbers(e);
-            let value = e.value / rho_of(e, numbers);
+            let (numbers, rho) = self.numbers(e, mixture);
+            let value = e.value / rho;
             if e.technique.gathers_alone() && numbers[e.technique as usize] > 0.0 && value <= REGULAR {
                 pairs.add(e.walk, value);
             }
@@ -121,8 +101,7 @@ impl Candidate {
         // The second moment of all, and of what gathering walks find each for itself and regularly.
         let (mut all, mut regular) = (0.0, 0.0);
         for e in self.noisy(&found.evidence) {
-            let numbers = numbers(e);
-            let rho = rho_of(e, numbers);
+            let (numbers, rho) = self.numbers(e, mixture);
             all += e.square / rho;
             if e.value <= REGULAR * rho {
                 let alone = Technique::ALL.into_iter().filter(|t| t.gathers_alone()).map(|t| t as usize);
@@ -130,6 +109,35 @@ impl Candidate {
             }
         }
         (all - regular * (1.0 - pairs.part_of_noise())).max(LEAST_VARIANCE * all)
+    }
+
+    /// That of splats among it.
+    pub(super) fn noise_of_splats(&self, found: &Findings, mixture: &Mixture) -> f64 {
+        let of = |e: &Evidence| {
+            let (numbers, rho) = self.numbers(e, mixture);
+            let splats = Technique::Splat as usize;
+            e.square / rho * e.shares[splats] * numbers[splats] / rho
+        };
+        self.noisy(&found.evidence).map(of).sum()
+    }
+
+    /// How often each join finds a path for one of the mixture's, and all of them together.
+    fn numbers(&self, e: &Evidence, mixture: &Mixture) -> ([f64; Technique::ALL.len()], f64) {
+        let on = |b: bool| if b { 1.0 } else { 0.0 };
+        let n = mixture.times(self.light_paths);
+        // Where merges find a crowd at once, more light paths make it larger, not more often found.
+        let chance = mixture.by_chance(n);
+        let by_chance = chance * (1.0 + e.crowd) / (1.0 + chance * e.crowd);
+        let merges = on(self.merge) * mixture.shrunk * (n * (1.0 - e.by_chance) + by_chance * e.by_chance);
+        let numbers = Technique::ALL.map(|technique| match technique {
+            Technique::Hit => 1.0,
+            Technique::NextEvent => on(self.next_event),
+            Technique::Connect => on(self.connect),
+            Technique::Splat => n,
+            Technique::Merge => merges,
+        });
+        let rho = e.shares.iter().zip(numbers).map(|(r, n)| r * n).sum::<f64>();
+        (numbers, rho.max(LOST))
     }
 
     /// What brings noise: not delta lights seen by next events; what chains vary is measured apart.

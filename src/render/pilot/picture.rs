@@ -61,17 +61,22 @@ impl Coarse {
     /// A cell has seen few walks, so it is taken together with those around it: where it was missed by
     /// chance, the first contribution would seem enormous.
     pub(super) fn squares(&self) -> Vec<f64> {
+        self.squares_around(BLUR)
+    }
+
+    /// The same with so many cells on each side, or none.
+    pub(super) fn squares_around(&self, blur: u32) -> Vec<f64> {
         self.each_cell(|at| {
             let add = |(s, p): (f64, f64), c: u32| (s + self.image[c as usize], p + self.cell_pixels(c));
-            let (sum, pixels) = self.around(at).fold((0.0, 0.0), add);
+            let (sum, pixels) = self.around(at, blur).fold((0.0, 0.0), add);
             sum / (self.weight * pixels)
         })
     }
 
     /// The cells around one, itself included.
-    fn around(&self, (x, y): (u32, u32)) -> impl Iterator<Item = u32> {
+    fn around(&self, (x, y): (u32, u32), blur: u32) -> impl Iterator<Item = u32> {
         let [columns, rows] = self.cells;
-        let near = |at: u32, size: u32| at.saturating_sub(BLUR)..(at + BLUR + 1).min(size);
+        let near = move |at: u32, size: u32| at.saturating_sub(blur)..(at + blur + 1).min(size);
         let row = near(x, columns);
         near(y, rows).flat_map(move |y| row.clone().map(move |x| y * columns + x))
     }
@@ -88,7 +93,7 @@ impl Coarse {
     pub(super) fn dark_squares(&self) -> Vec<f64> {
         self.each_cell(|at| {
             let radiance = |c: u32| self.image[c as usize] / (self.weight * self.cell_pixels(c));
-            let mut all: Vec<f64> = self.around(at).map(radiance).collect();
+            let mut all: Vec<f64> = self.around(at, BLUR).map(radiance).collect();
             let middle = all.len() / 2;
             *all.select_nth_unstable_by(middle, f64::total_cmp).1
         })
