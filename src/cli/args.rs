@@ -171,7 +171,8 @@ pub struct RenderArgs {
     /// Which equation to expand.
     #[arg(short, long, value_enum, value_name = "NAME", default_value_t)]
     pub estimator: EstimatorName,
-    /// Samples per pixel [default: the scene's, or 64; without end if only --time is given].
+    /// Samples per pixel [default: the scene's, or 64; without end if only --time is given]; --estimator auto may give
+    /// pixels where they vary more several in each pass.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub spp: Option<u64>,
     /// Time to take, pilot included, such as 20s or 5m; the sample that ends closest to it is the last.
@@ -315,7 +316,7 @@ pub struct TransportArgs {
     /// Let a walk through glass choose at random which way it looks for lamps, instead of following all
     #[arg(long)]
     pub no_branching: bool,
-    /// The same number of gathering walks for all pixels, not more where a pilot found that they vary more
+    /// One gathering walk per pixel and pass, not more where the pilot of --estimator auto found that they vary more
     #[arg(long)]
     pub no_adaptive: bool,
     /// How walks draw: evenly spread over their first decisions (the variance that the image reports is

@@ -254,7 +254,9 @@ impl Job<'_> {
         let joins = plan.settings.techniques.names();
         let led = if plan.incident.is_some() { "; gathering is led to the light" } else { "" };
         let paths = show_count(f64::from(plan.light_paths));
-        format!("chosen in {}: {joins}; {paths} light paths per pass{led}\n", show_duration(pilot))
+        let most = plan.settings.samples.rows().flatten().max();
+        let walks = most.map_or(String::new(), |n| format!(", up to {n} walks per pixel"));
+        format!("chosen in {}: {joins}; {paths} light paths per pass{walks}{led}\n", show_duration(pilot))
     }
 
     fn run(&mut self, scene: &Scene) -> Result<Exit, Failure> {
@@ -337,7 +339,8 @@ impl Job<'_> {
     fn summary(&self, render: &Render) -> String {
         let s = render.statistics();
         let pixels = f64::from(render.film().width()) * f64::from(render.film().height());
-        let rate = s.passes as f64 * pixels / s.time.as_secs_f64().max(1e-9);
+        let samples = (s.passes as f64 * pixels).max(s.rays.gather_walks as f64);
+        let rate = samples / s.time.as_secs_f64().max(1e-9);
         let mut text = String::new();
         for (n, what) in [(s.dropped, "not finite and were dropped"), (s.cut, "beyond the film's range and were cut")] {
             if n > 0 {
@@ -382,7 +385,8 @@ impl Job<'_> {
         let set = &render.plan().settings;
         let seconds = s.time.as_secs_f64();
         let threads = rayon::current_num_threads();
-        let samples = s.passes as f64 * f64::from(film.width()) * f64::from(film.height());
+        let of_all_pixels = s.passes as f64 * f64::from(film.width()) * f64::from(film.height());
+        let samples = of_all_pixels.max(s.rays.gather_walks as f64);
         serde_json::json!({
             "version": env!("CARGO_PKG_VERSION"),
             "command": self.command_line(),
@@ -409,6 +413,7 @@ impl Job<'_> {
             "height": film.height(),
             "threads": threads,
             "samples_per_pixel": s.passes,
+            "walks_per_pixel": s.rays.gather_walks as f64 / of_all_pixels.max(1.0),
             "light_paths_per_pass": render.plan().light_paths,
             "render_seconds": seconds,
             "shoot_seconds": s.shoot_time.as_secs_f64(),

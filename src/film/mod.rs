@@ -1,6 +1,6 @@
 //! Film: `Φ_j = (1/n) Σ_p x_jp`, the mean over passes of what each pass found at pixel `j`.
 //!
-//! The unit of sampling is the pass: one gathering walk per pixel, or `N` shooting walks, or both.
+//! The unit of sampling is the pass: gathering walks of every pixel, one unless a pilot gives some more, or `N` shooting walks, or both.
 //! `x_jp` is all that pass `p` contributed to pixel `j`, splats included, so that its variance over
 //! passes is the variance of the estimate, whichever walkers made it.
 //!

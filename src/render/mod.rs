@@ -1,6 +1,6 @@
 //! Rendering: passes of walks into a film, under a budget, observed and interruptible.
 //!
-//! A pass is one gathering walk per pixel and N shooting walks. First all light paths of the pass
+//! A pass is one gathering walk per pixel, or more where a pilot found that they vary more, and N shooting walks. First all light paths of the pass
 //! are shot (jobs of [`SHOOT_JOB`] paths), their splats sorted by tile and their vertices kept for
 //! connections; then the tiles gather and add their splats. Every random number is a function of
 //! (walker, pixel or path, pass, seed) and the film adds integers, so threads and interruptions
@@ -45,7 +45,7 @@ use std::time::{Duration, Instant};
 /// When a render ends: at whichever comes first; with neither, after one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Budget {
-    /// Passes in all (samples per pixel).
+    /// Passes in all (samples per pixel, at least).
     pub passes: Option<u64>,
     /// Time from the start of [`Render::run`]; it ends with the pass that comes closest to it.
     pub time: Option<Duration>,
@@ -63,7 +63,7 @@ impl Budget {
     }
 }
 
-/// With so many pairs of passes to the time of a render, it ends with a pair.
+/// Where so many pairs of passes fit into the time of a render, it ends with a pair.
 const PAIRS_IN_TIME: u32 = 8;
 
 /// How far a render is.

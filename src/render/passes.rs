@@ -261,7 +261,7 @@ impl Gathering<'_> {
     }
 }
 
-/// Gathers one sample per pixel and pass, adds the splats, and commits the passes to the film.
+/// Gathers the samples of all pixels in each pass, adds the splats, and commits the passes to the film.
 fn gather_passes<S: Sink>(render: &mut Render<'_>, range: Range<u64>, cache: &LightCache, bins: Option<&SplatBins<S::Kept>>) {
     let (scene, plan, filter, crop) = (render.scene, &render.plan, &render.filter, render.crop);
     let exponent = render.film.exponent();

@@ -56,7 +56,7 @@ impl SampleMap {
         if self.samples.is_empty() {
             return 1;
         }
-        let at = |p: f32, corner: u32| (p.floor() as i64 - i64::from(corner)) as i32;
+        let at = |p: f32, corner: u32| (p - corner as f32).floor() as i32;
         self.at((at(raster.x, self.crop[0]), at(raster.y, self.crop[1])))
     }
 }

@@ -40,9 +40,9 @@ pub(super) struct ChainNoise {
     branches: f64,
 }
 
-/// The sum of what a sample finds.
+/// The sum of what walks find.
 #[derive(Default)]
-struct Sum(f64);
+pub(super) struct Sum(pub(super) f64);
 impl Record for Sum {
     fn gathered(&mut self, c: Contribution) {
         self.0 += f64::from(c.value.mean());

@@ -26,10 +26,10 @@ const NO_LESSONS_MUST_WIN: f64 = 2.0;
 const GUIDE_MUST_WIN: f64 = 1.1;
 /// Cost of operations, in units of a step of a gathering walk: user time of passes of five scenes with and
 /// without each join, divided by its counts. Only ratios matter, and only as far as they change the order of candidates.
-struct Costs {
-    gather_walk: f64,
-    gather_step: f64,
-    next_event: f64,
+pub(super) struct Costs {
+    pub(super) gather_walk: f64,
+    pub(super) gather_step: f64,
+    pub(super) next_event: f64,
     connect: f64,
     merge: f64,
     shoot_walk: f64,
@@ -42,7 +42,7 @@ struct Costs {
     /// Learned directions of a vertex, for either walker.
     directions: f64,
 }
-const COSTS: Costs = Costs {
+pub(super) const COSTS: Costs = Costs {
     gather_walk: 1.7,
     gather_step: 1.0,
     next_event: 1.1,

@@ -4,19 +4,20 @@
 //! a walk among others of its pass, without that of light vertices, which all of them share. With σ² relative to the picture and
 //! a cost c, n ∝ σ/√c makes least error of a time [Neyman 1934].
 
+use super::chains::Sum;
+use super::choice::COSTS;
 use super::{Decisions, Pilot};
 use crate::film::Filter;
 use crate::math::random::Family;
 use crate::math::{Random, limit};
 use crate::render::passes::GATHER_AXES;
+use crate::transport::RayCounts;
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
 use crate::transport::sample_map::{SampleMap, cell};
 use crate::transport::settings::Plan;
 use crate::transport::shoot::shoot;
 use crate::transport::walk::{Context, Tally};
-use crate::transport::{Contribution, RayCounts, Record};
-use glam::Vec2;
 use rayon::prelude::*;
 
 /// Cells along the longer side of the picture, at most,
@@ -37,9 +38,6 @@ const LIGHT_PATHS: u32 = 65_536;
 const MOST: f64 = 24.0;
 /// Steps towards that.
 const CLIPPINGS: u32 = 16;
-/// Cost of a walk and of a shadow ray, in rays.
-const WALK: f64 = 1.7;
-const SHADOW: f64 = 1.1;
 /// Cost of all gathering walks of a pass, at most, for one of each pixel.
 const MOST_COST: f64 = 2.0;
 /// Most walks of a pixel.
@@ -78,16 +76,6 @@ impl Look {
             pixels: self.pixels + part * other.pixels,
         }
     }
-}
-
-/// The sum of what walks find.
-#[derive(Default)]
-struct Sum(f64);
-impl Record for Sum {
-    fn gathered(&mut self, c: Contribution) {
-        self.0 += f64::from(c.value.mean());
-    }
-    fn splatted(&mut self, _: Vec2, _: &mut Random, _: Contribution) {}
 }
 
 impl Pilot<'_> {
@@ -165,7 +153,8 @@ impl Pilot<'_> {
             let walks = f64::from(2 * SET);
             // The variance of either sum is SET times that of a walk.
             let noise = difference * difference / (walks * square);
-            let cost = WALK + (rays.gather as f64 + SHADOW * rays.shadow as f64) / walks;
+            let of_rays = COSTS.gather_step * rays.gather as f64 + COSTS.next_event * rays.shadow as f64;
+            let cost = COSTS.gather_walk + of_rays / walks;
             let pixel = (corner.x as i32 - self.crop[0] as i32, corner.y as i32 - self.crop[1] as i32);
             noise.is_finite().then_some((pixel, Look { noise, cost, pixels: 1.0 }))
         };
@@ -186,7 +175,7 @@ fn blurred(sums: &[Look], [columns, rows]: [u32; 2]) -> Vec<Vec<Worth>> {
         let cells = near(y, rows).flat_map(|v| near(x, columns).map(move |u| (u, v)));
         let sum = cells.fold(Look::default(), |sum, (u, v)| sum.and(part(x, u) * part(y, v), sums[(v * columns + u) as usize]));
         let pixels = sum.pixels.max(f64::MIN_POSITIVE);
-        (sum.noise / pixels, (sum.cost / pixels).max(WALK))
+        (sum.noise / pixels, (sum.cost / pixels).max(COSTS.gather_walk))
     };
     (0..rows).map(|y| (0..columns).map(|x| around(x, y)).collect()).collect()
 }
