@@ -64,7 +64,7 @@ impl Budget {
 }
 
 /// Where so many pairs of passes fit into the time of a render, it ends with a pair.
-const PAIRS_IN_TIME: u32 = 8;
+const PAIRS_IN_TIME: u32 = 5;
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -190,7 +190,7 @@ impl<'a> Render<'a> {
 
     /// Renders until the budget is used up or `progress` says stop; may be called again to go on.
     pub fn run(&mut self, budget: &Budget, mut progress: impl FnMut(&Progress) -> Control + Send) -> Outcome {
-        let start = Instant::now();
+        let (start, before_this) = (Instant::now(), self.statistics.time);
         loop {
             let done = self.film.passes().next();
             let rest = budget.passes.map(|n| n.saturating_sub(done));
@@ -198,8 +198,8 @@ impl<'a> Render<'a> {
             let group = match budget.time {
                 None if self.plan.light_paths == 0 => 4,
                 Some(_) if self.plan.light_paths == 0 => 2,
-                // Points of a sequence come in pairs: an odd one out may bring more noise than it takes.
-                Some(t) if done > 0 && PAIRS_IN_TIME * self.usual_time(2) <= t => 2 - done % 2,
+                // Points of a sequence come in pairs, and one of two lights for each: an odd one out may bring more noise than it takes.
+                Some(t) if done > 0 && PAIRS_IN_TIME * self.usual_time(2) <= before_this + t => 2 - done % 2,
                 _ => 1,
             };
             let group = rest.map_or(group, |r| r.min(group)).max(1);
