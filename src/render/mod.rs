@@ -47,7 +47,7 @@ use std::time::{Duration, Instant};
 pub struct Budget {
     /// Passes in all (samples per pixel, at least).
     pub passes: Option<u64>,
-    /// Time from the start of [`Render::run`]; it ends with the pass that comes closest to it.
+    /// Time from the start of [`Render::run`]; it ends with the pass, or the pair of passes, that comes closest to it.
     pub time: Option<Duration>,
 }
 
@@ -194,14 +194,8 @@ impl<'a> Render<'a> {
         loop {
             let done = self.film.passes().next();
             let rest = budget.passes.map(|n| n.saturating_sub(done));
-            // Nothing couples the passes of pure gathering: several at a time stay in the cache.
-            let group = match budget.time {
-                None if self.plan.light_paths == 0 => 4,
-                Some(_) if self.plan.light_paths == 0 => 2,
-                // Points of a sequence come in pairs, and one of two lights for each: an odd one out may bring more noise than it takes.
-                Some(t) if done > 0 && PAIRS_IN_TIME * self.usual_time(2) <= before_this + t => 2 - done % 2,
-                _ => 1,
-            };
+            let in_time = budget.time.map(|t| (self.usual_time(1), before_this + t));
+            let group = usual_group(done, self.plan.light_paths > 0, in_time);
             let group = rest.map_or(group, |r| r.min(group)).max(1);
             let out_of_time = budget.time.is_some_and(|t| is_closest(start.elapsed(), self.usual_time(group), t));
             let unbounded = budget.passes.is_none() && budget.time.is_none();
@@ -275,6 +269,18 @@ impl<'a> Render<'a> {
     }
 }
 
+/// Passes to make at once after `done` of them; of a render by time, how long one takes and all are to take.
+fn usual_group(done: u64, shoots: bool, in_time: Option<(Duration, Duration)>) -> u64 {
+    match (shoots, in_time) {
+        // Nothing couples the passes of pure gathering: several at a time stay in the cache.
+        (false, None) => 4,
+        (false, Some(_)) => 2,
+        // Points of a sequence come in pairs, and one of two lights for each: an odd one out may bring more noise than it takes.
+        (true, Some((pass, all))) if done > 0 && PAIRS_IN_TIME * 2 * pass <= all => 2 - done % 2,
+        (true, _) => 1,
+    }
+}
+
 /// Whether a render that has taken `elapsed` is no farther from `wanted` than with another `more`.
 fn is_closest(elapsed: Duration, more: Duration, wanted: Duration) -> bool {
     elapsed + more / 2 >= wanted
@@ -290,5 +296,14 @@ mod tests {
         let is = |elapsed, pass| is_closest(seconds(elapsed), seconds(pass), seconds(20.0));
         // 19 or 21.5, 18.5 or 21, and whatever is beyond.
         assert!(is(19.0, 2.5) && !is(18.5, 2.5) && is(20.0, 0.0) && is(25.0, 2.5) && !is(0.0, 2.5));
+    }
+
+    #[test]
+    fn passes_come_in_pairs_where_they_are_short() {
+        let seconds = Duration::from_secs_f64;
+        let of = |done, pass| usual_group(done, true, Some((seconds(pass), seconds(20.0))));
+        assert_eq!([of(0, 0.0), of(1, 2.0), of(2, 2.0), of(7, 1.0), of(2, 2.1)], [1, 1, 2, 1, 1]);
+        assert_eq!([usual_group(6, true, None), usual_group(6, false, None)], [1, 4]);
+        assert_eq!(usual_group(6, false, Some((seconds(9.0), seconds(20.0)))), 2);
     }
 }
