@@ -175,7 +175,7 @@ pub struct RenderArgs {
     /// pixels where they vary more several in each pass.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub spp: Option<u64>,
-    /// Time to take, pilot included, such as 20s or 5m; the sample that ends closest to it is the last.
+    /// Time to take, pilot included, such as 20s or 5m; the sample, or pair of samples, that ends closest to it is the last.
     #[arg(long, value_name = "TIME", value_parser = units::duration)]
     pub time: Option<Duration>,
     /// Seed of all random numbers [default: the scene's, or 0].
