@@ -180,7 +180,10 @@ impl Decisions {
         bytes.extend(self.settings.faint.to_bits().to_le_bytes());
         bytes.extend(self.settings.chain_samples.to_le_bytes());
         bytes.push(u8::from(self.settings.guided_gathering));
-        self.settings.samples.rows().for_each(|row| bytes.extend(row));
+        for row in self.settings.samples.rows() {
+            // No number of walks is 0, so a row ends with one.
+            bytes.extend(row.iter().chain(&[0]));
+        }
         bytes
     }
 }
@@ -221,5 +224,20 @@ impl<'a> Pilot<'a> {
     /// Walks of either kind in a whole pass, of which a round has a part.
     fn part(&self, plan: &Plan) -> u32 {
         if plan.light_paths > 0 { plan.light_paths } else { self.pixels() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn films_of_other_numbers_of_walks_are_others() {
+        let of = |rows: &[Vec<u8>]| {
+            let samples = Arc::new(SampleMap::from_rows(rows).unwrap_or_default());
+            Decisions::nothing(&Settings { samples, ..Settings::default() }).bytes()
+        };
+        let all = [of(&[]), of(&[vec![1, 2, 3, 4]]), of(&[vec![1, 2], vec![3, 4]]), of(&[vec![1, 2], vec![4, 3]])];
+        assert!((0..all.len()).all(|i| !all[..i].contains(&all[i])));
     }
 }
