@@ -15,7 +15,7 @@ use super::reference::Reference;
 use crate::film::layout::TILE_PIXELS;
 use crate::film::{Filter, Layout};
 use crate::math::Random;
-use crate::render::{Budget, Options, Render, SHOOT_JOB, light_path_random, pixel_random};
+use crate::render::{Budget, Options, Render, SHOOT_JOB, light_path_random, pixel_randoms};
 use crate::scene::emitter::Emission;
 use crate::scene::{Scene, Surface};
 use crate::transport::cache::{LightCache, LightVertex};
@@ -273,12 +273,12 @@ impl<'a> Walked<'a> {
         for (x, y, _) in self.layout.tile_rect(index).pixels() {
             let (px, py) = (self.crop[0] + x, self.crop[1] + y);
             let id = u64::from(py) * u64::from(self.scene.film.width) + u64::from(px);
-            let samples = self.plan.settings.samples.at((x as i32, y as i32));
-            for i in 0..u64::from(samples) {
-                let mut random = pixel_random(&self.plan, id, self.passes * u64::from(samples) + i);
+            let walks = pixel_randoms(&self.plan, (x as i32, y as i32), id, self.passes);
+            let part = 1.0 / walks.len() as f32;
+            for mut random in walks {
                 let (offset, weight) = self.filter.sample_offset(random.axis2());
                 let raster = Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset;
-                let mut at = At { walked: self, pixel: self.layout.pixel(x, y), part: 1.0 / samples as f32, found: &found };
+                let mut at = At { walked: self, pixel: self.layout.pixel(x, y), part, found: &found };
                 let mut observe = Observing { watch: &mut watch, found: &found };
                 let mut tally = Tally { record: &mut at, rays: &mut rays, observe: &mut observe };
                 gather(cx, raster, weight, cache, &mut random, &mut tally);

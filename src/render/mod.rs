@@ -33,7 +33,7 @@ pub use left_out::left_out;
 pub use measure::{Measurement, PixelMeasurement, measure};
 pub(crate) use order::order;
 pub use passes::SHOOT_JOB;
-pub(crate) use passes::{light_path_random, pixel_random};
+pub(crate) use passes::{light_path_random, pixel_randoms};
 pub use truncation::Truncation;
 
 use crate::film::{Film, FilmError, Filter};

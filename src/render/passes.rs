@@ -103,31 +103,29 @@ fn run_into<S: Sink>(render: &mut Render<'_>, range: Range<u64>) {
 
 /// The random numbers of light path `index` of a pass.
 pub(crate) fn light_path_random(plan: &Plan, index: u32, pass: u64) -> Random {
-    let (index, seed) = (u64::from(index), plan.settings.seed);
-    let random = Random::new(Family::Shoot, index, pass, seed);
+    let index = u64::from(index);
     let point = pass.wrapping_mul(u64::from(plan.light_paths)).wrapping_add(index);
-    if plan.settings.stratified { random.with_point(Family::Shoot, 0, point, seed, SHOOT_AXES) } else { random }
+    plan.random(Family::Shoot, (index, pass), (0, point), SHOOT_AXES)
 }
 
-/// The random numbers of the pixel with number `id` in the whole film.
-pub(crate) fn pixel_random(plan: &Plan, id: u64, pass: u64) -> Random {
-    let seed = plan.settings.seed;
-    let random = Random::new(Family::Gather, id, pass, seed);
-    if plan.settings.stratified { random.with_point(Family::Gather, id, pass, seed, GATHER_AXES) } else { random }
+/// The random numbers of each walk of a pass of pixel (x, y) of the crop window, with number `id` in the whole film.
+#[inline]
+pub(crate) fn pixel_randoms(plan: &Plan, pixel: (i32, i32), id: u64, pass: u64) -> impl ExactSizeIterator<Item = Random> {
+    let samples = plan.settings.samples.at(pixel);
+    (0..samples).map(move |i| {
+        let sample = pass * u64::from(samples) + u64::from(i);
+        plan.random(Family::Gather, (id, sample), (id, sample), GATHER_AXES)
+    })
 }
 
 /// The random numbers that all pixels of a pass have in common.
 fn film_random(plan: &Plan, pass: u64) -> Random {
-    let seed = plan.settings.seed;
-    let random = Random::new(Family::Film, 0, pass, seed);
-    if plan.settings.stratified { random.with_point(Family::Film, 0, pass, seed, FILM_AXES) } else { random }
+    plan.random(Family::Film, (0, pass), (0, pass), FILM_AXES)
 }
 
 /// The random numbers of sample `sample` of chains alone of the pixel with number `id` in the whole film.
 fn chain_random(plan: &Plan, id: u64, sample: u64) -> Random {
-    let seed = plan.settings.seed;
-    let random = Random::new(Family::Chain, id, sample, seed);
-    if plan.settings.stratified { random.with_point(Family::Chain, id, sample, seed, CHAIN_AXES) } else { random }
+    plan.random(Family::Chain, (id, sample), (id, sample), CHAIN_AXES)
 }
 
 /// Shoots all light paths of a pass.
@@ -221,11 +219,10 @@ impl Gathering<'_> {
         mut found: impl FnMut(&Contribution),
     ) {
         let (corner, id) = self.pixel(pixel);
-        let samples = self.plan.settings.samples.at(pixel);
-        let part = 1.0 / samples as f32;
+        let walks = pixel_randoms(self.plan, pixel, id, pass);
+        let part = 1.0 / walks.len() as f32;
         let mut record = PixelRecord(|c: &Contribution| found(&Contribution { value: c.value * part, ..*c }));
-        for i in 0..u64::from(samples) {
-            let mut random = pixel_random(self.plan, id, pass * u64::from(samples) + i);
+        for mut random in walks {
             let (raster, weight) = match taps {
                 Some(taps) => (corner + 0.5 + taps.offset, 1.0),
                 None => self.place(corner, &mut random),

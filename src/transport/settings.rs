@@ -8,6 +8,8 @@ use super::incident::Incident;
 use super::mis::Heuristic;
 use super::mutant::{Mutant, planted};
 use super::sample_map::SampleMap;
+use crate::math::Random;
+use crate::math::random::Family;
 use crate::scene::emitter::Guide;
 use glam::Vec2;
 use std::sync::Arc;
@@ -277,6 +279,15 @@ impl Plan {
             incident: None,
             settings,
         }
+    }
+
+    /// The random numbers of a walk of `family` (index, sample); its first `axes` axes are those of a point (sequence, number)
+    /// where walks fill space evenly.
+    #[inline]
+    pub fn random(&self, family: Family, walk: (u64, u64), point: (u64, u64), axes: u32) -> Random {
+        let seed = self.settings.seed;
+        let random = Random::new(family, walk.0, walk.1, seed);
+        if self.settings.stratified { random.with_point(family, point.0, point.1, seed, axes) } else { random }
     }
 
     /// N of the weights where a path meets the film.

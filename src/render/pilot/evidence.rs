@@ -333,10 +333,8 @@ fn of_set(pilot: &Pilot<'_>, plan: &Plan, index: u32, walks: u32) -> (Random, Ve
     let (pair, set) = (index / (2 * SET), index / SET);
     let numbers = |i: u32| Random::new(Family::Pilot, u64::from(i) | 1 << 38, 0, seed);
     let pixel = pilot.pixel(pair, walks / (2 * SET), &mut numbers(pair));
-    let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 39, 0, seed);
-    if plan.settings.stratified {
-        random = random.with_point(Family::Pilot, u64::from(set) | 1 << 39, u64::from(index % SET), seed, GATHER_AXES);
-    }
+    let [walk, set] = [index, set].map(|i| u64::from(i) | 1 << 39);
+    let mut random = plan.random(Family::Pilot, (walk, 0), (set, u64::from(index % SET)), GATHER_AXES);
     let raster = pixel + random.axis2();
     (random, raster)
 }

@@ -1,6 +1,7 @@
 //! The picture that a pilot has seen so far, coarse: what contributions are relative to.
 
 use glam::Vec2;
+use std::ops::Range;
 
 /// Cells on each side of one that are taken together with it.
 const BLUR: u32 = 2;
@@ -9,6 +10,11 @@ const CELLS: u32 = 64;
 
 /// Index of a cell of the coarse image.
 pub(super) type Cell = u32;
+
+/// The cells, of `size` along an axis, that are no farther from `at` than so many.
+pub(super) fn near(at: u32, size: u32, cells: u32) -> Range<u32> {
+    at.saturating_sub(cells)..(at + cells + 1).min(size)
+}
 
 /// Sums of estimates of a crop window, by cells of some pixels.
 pub(super) struct Coarse {
@@ -76,9 +82,8 @@ impl Coarse {
     /// The cells around one, itself included.
     fn around(&self, (x, y): (u32, u32), blur: u32) -> impl Iterator<Item = u32> {
         let [columns, rows] = self.cells;
-        let near = move |at: u32, size: u32| at.saturating_sub(blur)..(at + blur + 1).min(size);
-        let row = near(x, columns);
-        near(y, rows).flat_map(move |y| row.clone().map(move |x| y * columns + x))
+        let row = near(x, columns, blur);
+        near(y, rows, blur).flat_map(move |y| row.clone().map(move |x| y * columns + x))
     }
 
     /// Squares of a radiance of each cell, and a little more.

@@ -6,6 +6,7 @@
 
 use super::chains::Sum;
 use super::choice::COSTS;
+use super::picture::near;
 use super::{Decisions, Pilot};
 use crate::film::Filter;
 use crate::math::random::Family;
@@ -40,8 +41,8 @@ const MOST: f64 = 24.0;
 const CLIPPINGS: u32 = 16;
 /// Cost of all gathering walks of a pass, at most, for one of each pixel.
 const MOST_COST: f64 = 2.0;
-/// Most walks of a pixel.
-const MOST_SAMPLES: u8 = 8;
+/// Most walks of a pixel that are chosen.
+const MOST_CHOSEN: u8 = 8;
 /// Part of the noise of splats that is left of what the choice of techniques expects: their relative weight where they crowd is
 /// overrated by coarse cells, and all light paths of a render fill space evenly.
 const LEFT_OF_SPLATS: f64 = 0.5;
@@ -126,9 +127,8 @@ impl Pilot<'_> {
         // Where pixels share walks, all of a pass stand at the same place in their pixels.
         let together = Filter::new(self.scene.film.filter).is_some_and(|f| f.reach() > 0);
         let pixels = self.pixels().min(MOST_WALKS) / (2 * SET);
-        let seed = plan.settings.seed;
         let look = |index: u32| {
-            let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 41, 0, seed);
+            let mut random = Random::new(Family::Pilot, u64::from(index) | 1 << 41, 0, plan.settings.seed);
             let corner = self.pixel(index, pixels, &mut random);
             let place = random.unit2();
             let mut rays = RayCounts::default();
@@ -136,10 +136,7 @@ impl Pilot<'_> {
                 let id = u64::from(2 * index + set) | 1 << 42;
                 let mut sum = Sum::default();
                 for i in 0..u64::from(SET) {
-                    let mut random = Random::new(Family::Pilot, id, i, seed);
-                    if plan.settings.stratified {
-                        random = random.with_point(Family::Pilot, id, i, seed, GATHER_AXES);
-                    }
+                    let mut random = plan.random(Family::Pilot, (id, i), (id, i), GATHER_AXES);
                     // As in a render, where it is free to differ.
                     let own = random.axis2();
                     let raster = corner + if together { place } else { own };
@@ -170,9 +167,8 @@ type Worth = (f64, f64);
 fn blurred(sums: &[Look], [columns, rows]: [u32; 2]) -> Vec<Vec<Worth>> {
     // A cell, half of those beside it, and a quarter of those at its corners.
     let part = |a: u32, b: u32| if a == b { 1.0 } else { 0.5 };
-    let near = |at: u32, size: u32| at.saturating_sub(1)..(at + 2).min(size);
     let around = |x: u32, y: u32| {
-        let cells = near(y, rows).flat_map(|v| near(x, columns).map(move |u| (u, v)));
+        let cells = near(y, rows, 1).flat_map(|v| near(x, columns, 1).map(move |u| (u, v)));
         let sum = cells.fold(Look::default(), |sum, (u, v)| sum.and(part(x, u) * part(y, v), sums[(v * columns + u) as usize]));
         let pixels = sum.pixels.max(f64::MIN_POSITIVE);
         (sum.noise / pixels, (sum.cost / pixels).max(COSTS.gather_walk))
@@ -189,7 +185,7 @@ fn dealt(cells: &[Vec<Worth>], beside: Beside) -> SampleMap {
         return SampleMap::default();
     }
     // With the scale 1 walks would cost as much as one for each pixel, were numbers not whole and at least one.
-    let number = |scale: f64, (n, c): Worth| (scale * (n / c).sqrt() * cost / root).round().clamp(1.0, MOST_SAMPLES.into());
+    let number = |scale: f64, (n, c): Worth| (scale * (n / c).sqrt() * cost / root).round().clamp(1.0, MOST_CHOSEN.into());
     // Noise and cost of gathering, relative to those of one walk everywhere.
     let gathering = |scale: f64| {
         let of = |(n, c), worth: &Worth| (n + worth.0 / number(scale, *worth), c + worth.1 * number(scale, *worth));
