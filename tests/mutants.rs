@@ -44,7 +44,7 @@ struct Check {
     led: bool,
 }
 
-const CHECKS: [Check; 8] = [
+const CHECKS: [Check; 9] = [
     Check {
         mutant: Mutant::AdjointShadingNormal,
         named: "agreement::shading_normals::joins",
@@ -97,6 +97,15 @@ const CHECKS: [Check; 8] = [
         paths: "visible-to:gather",
         a: ("nee", 3),
         b: ("hit,nee,splat,connect", 3),
+        led: false,
+    },
+    Check {
+        mutant: Mutant::FewLights,
+        named: "agreement::few_lamps::joins",
+        scene: "few lamps",
+        paths: "E .* D L",
+        a: ("hit", 3),
+        b: ("nee", 3),
         led: false,
     },
     Check {

@@ -16,7 +16,7 @@ use super::walk::{Arrival, Chain, Context, Join, Observe, Tally, Walk, end, sees
 use super::{Contribution, Record, Technique};
 use crate::local::{Breadth, Equation};
 use crate::math::Random;
-use crate::scene::emitter::EmitterPoint;
+use crate::scene::emitter::{EmitterPoint, NextEvent};
 use crate::scene::geometry::Ray;
 use crate::scene::sensor::SensorRay;
 use crate::scene::{EmitterId, Surface};
@@ -300,7 +300,8 @@ fn arrived_on_light<R: Record, O: Observe>(
     finish(cx, path, value, join, 0, tally);
 }
 
-/// Picks a light point from `vertex`.
+/// Next events of `vertex`: a point of one light that is picked. Where the picture shows the vertex, be it in a mirror or through
+/// glass, the expectation over the pick instead, if lights are few: a point of each. The weights are those of the pick.
 #[inline]
 fn next_event<R: Record, O: Observe>(
     cx: Context<'_>,
@@ -310,14 +311,40 @@ fn next_event<R: Record, O: Observe>(
     random: &mut Random,
     tally: &mut Tally<'_, R, O>,
 ) {
-    let (scene, plan) = (cx.scene, cx.plan);
+    /// Shifts the points for one light from those for another, so that each are as even [Roberts 2018, the plastic number].
+    const SHIFT: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
+    let (geometry, lights) = (&cx.scene.geometry, &cx.scene.lights);
     let (u, u_pick) = (random.axis2(), random.axis());
-    let length = walk.length + 2;
-    if !plan.wants_length(length) {
+    if !cx.plan.wants_length(walk.length + 2) {
         return;
     }
-    let x = &vertex.surface;
-    let Some(mut ne) = scene.lights.sample_next_event(&scene.geometry, x.p, u_pick, u) else { return };
+    let x = vertex.surface.p;
+    let few = if walk.clear { lights.few() } else { &[] };
+    if few.is_empty()
+        && let Some(ne) = lights.sample_next_event(geometry, x, u_pick, u)
+    {
+        see(cx, walk, vertex, partial, (ne, 1.0), tally);
+    }
+    for (i, picked) in few.iter().enumerate() {
+        if let Some(ne) = lights.next_event_from(geometry, x, *picked, (u + i as f32 * SHIFT).fract()) {
+            let part = if planted(Mutant::FewLights) { 1.0 } else { picked.1 };
+            see(cx, walk, vertex, partial, (ne, part), tally);
+        }
+    }
+}
+
+/// `vertex` sees a light point, unless something stands between; `part` of that counts.
+#[inline]
+fn see<R: Record, O: Observe>(
+    cx: Context<'_>,
+    walk: &Walk,
+    vertex: &Vertex<'_>,
+    partial: Partial<f32>,
+    (mut ne, part): (NextEvent, f32),
+    tally: &mut Tally<'_, R, O>,
+) {
+    let (scene, plan) = (cx.scene, cx.plan);
+    let (x, length) = (&vertex.surface, walk.length + 2);
     if planted(Mutant::NextEventDensity) {
         ne.nu *= 1.5;
     }
@@ -332,7 +359,7 @@ fn next_event<R: Record, O: Observe>(
     };
     let sum = if length == 2 && !plan.splat_direct { 0.0 } else { partial.at(h, k.p_w_rev) };
     let weight = mis::next_event(h, ne.nu, g, e, sum);
-    let value = walk.throughput * k.value * ne.radiance * (ne.g / ne.nu * weight);
+    let value = walk.throughput * k.value * ne.radiance * (part * ne.g / ne.nu * weight);
     if value.is_black() {
         return;
     }

@@ -36,6 +36,8 @@ pub enum Mutant {
     Crowd = 14,
     /// Gathering walks do not know that their pixel has several in a pass.
     SampleMap = 15,
+    /// Where next events see all of few lights, each counts as if it alone had been picked.
+    FewLights = 16,
 }
 
 #[cfg(feature = "mutants")]

@@ -157,6 +157,7 @@ scenes_agree! {
     crop_window: "crop window",
     under_water: "under water",
     orthographic: "orthographic",
+    few_lamps: "few lamps",
     many_lamps: "many lamps",
     tiles_and_sky: "tiles and sky",
 }

@@ -6,6 +6,7 @@ mod caustic_room;
 mod chains;
 mod choice;
 mod determinism;
+mod few;
 mod furnace;
 mod lamps;
 mod led;

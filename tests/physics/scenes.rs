@@ -199,6 +199,8 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
         scene("crop window", CAMERA, CROP, &[CEILING, AREA, BLOCK]),
         scene("under water", UNDER_WATER, FILM, &[CEILING, AREA, WATER]),
         scene("orthographic", ORTHOGRAPHIC, FILM, &[CEILING, AREA, BLOCK]),
+        // So few that next events see all of them.
+        scene("few lamps", CAMERA, FILM, &[CEILING, AREA, LAMPS, constant, GLASS_AND_MIRROR]),
         // More lights than are asked evenly: a tree chooses among them.
         scene("many lamps", CAMERA, FILM, &[&lamps, BLOCK]),
         scene("tiles and sky", CAMERA, FILM, &[&tiles(4, 4, 0.6), LAMPS, constant, GLASS_AND_MIRROR]),

@@ -7,13 +7,16 @@
 //! than the power, and a wrong guess costs more than an even one); among many it looks at x ([`Many`]).
 //! This is the only place that decides it.
 
+use super::lights::Picked;
 use super::many::Many;
 use super::tree::{Bound, LightTree};
 use crate::math::distribution::Discrete;
 use glam::Vec3;
 
-/// Up to so many lights are few.
+/// Up to so many lights are few enough for a choice that is the same everywhere.
 const FEW: usize = 8;
+/// Up to so many are few enough to see all of them where the picture shows it.
+const ALL_SEEN: usize = 4;
 const UNIFORM_EMISSION: f64 = 0.1;
 
 #[derive(Clone, Debug)]
@@ -41,6 +44,13 @@ impl Choice {
             NextEventChoice::Many(Box::new(Many::new(powers, p_across, bound)?))
         };
         Some(Self { next_event, emission: mixture(powers, UNIFORM_EMISSION)? })
+    }
+
+    /// Every emitter that may be picked for a next event, where two to [`ALL_SEEN`] may.
+    pub(super) fn few(&self) -> Vec<Picked> {
+        let NextEventChoice::Few(discrete) = &self.next_event else { return vec![] };
+        let lit: Vec<Picked> = (0..discrete.len()).map(|i| (i, discrete.prob(i))).filter(|(_, prob)| *prob > 0.0).collect();
+        if (2..=ALL_SEEN).contains(&lit.len()) { lit } else { vec![] }
     }
 
     /// The tree of finite emitters, if they are many.

@@ -11,6 +11,9 @@ use crate::spectrum::Spectrum;
 use crate::texture::Textures;
 use glam::{Vec2, Vec3};
 
+/// Number of an emitter and the probability of picking it.
+pub type Picked = (usize, f32);
+
 /// All emitters of a scene. Without any that could light something, every sample is `None`.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
@@ -22,6 +25,8 @@ pub struct Lights {
     /// Ambient terms of local illumination.
     pub(super) ambient: Vec<(EmitterId, Spectrum)>,
     pub(super) choice: Option<Choice>,
+    /// See [`Lights::few`].
+    pub(super) few: Vec<Picked>,
     /// Centre of the sphere around the scene.
     pub(super) center: Vec3,
     /// Its radius R.
@@ -40,15 +45,22 @@ impl Lights {
         self.next_event_from(geometry, x, (i, prob), u)
     }
 
+    /// Every emitter that may be picked for a next event, where there are few, else none: then the pick may give way to its
+    /// expectation, the sum over all of [`Self::next_event_from`] times the probability of the pick.
+    #[inline]
+    pub fn few(&self) -> &[Picked] {
+        &self.few
+    }
+
     /// The same from one emitter, of which ν is then the density without any choice.
     pub fn next_event_of(&self, emitter: EmitterId, geometry: &Geometry, x: Vec3, u: Vec2) -> Option<NextEvent> {
         let (_, i) = self.chosen(emitter)?;
         self.next_event_from(geometry, x, (i, 1.0), u)
     }
 
-    /// A light point of emitter `i`, which was chosen with probability `prob`.
+    /// A light point of emitter `i`, which was picked with probability `prob`.
     #[inline]
-    fn next_event_from(&self, geometry: &Geometry, x: Vec3, (i, prob): (usize, f32), u: Vec2) -> Option<NextEvent> {
+    pub fn next_event_from(&self, geometry: &Geometry, x: Vec3, (i, prob): Picked, u: Vec2) -> Option<NextEvent> {
         let emitter = EmitterId(i as u32);
         match &self.emitters[i] {
             Emitter::Area(area) => {
