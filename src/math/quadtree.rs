@@ -3,7 +3,8 @@
 //!
 //! Leaves carry the second moment of what was found in them; the density that makes the variance of
 //! an estimator `f/p` least is `p ∝ √E[f²]` leaf by leaf [Pharr 2023, sec. 2.2.2; Rath 2020]. A part
-//! of the uniform density is always mixed in, since a leaf that is never sampled never learns.
+//! of the uniform density can be mixed in, since a leaf that is never sampled never learns; where all that matters is small,
+//! a mean over the whole square is next to nothing there, and what helps is that nodes share with their neighbours ([`SHARED`]).
 //! Descending the tree stretches `u` (no alias tables), which keeps the stratification of
 //! low-discrepancy points.
 
@@ -16,6 +17,9 @@ const DEEPEST: u32 = 14;
 const SPLIT_SHARE: f64 = 0.002;
 /// … if so many samples found something in it.
 const SPLIT_COUNT: u32 = 32;
+/// This part of the probability of the smallest nodes is shared evenly among their parts, of those one level higher half as
+/// much, and so on: a leaf in which nothing was found by chance lies among others where much was.
+const SHARED: f64 = 0.1;
 /// Levels that a search skips by a table.
 const SKIPPED: u32 = 6;
 /// What remains of old lessons when a round of learning ends: they belong to coarser leaves and were
@@ -34,6 +38,15 @@ struct Node {
     /// Probability of each quarter (x + 2y) given the node.
     prob: [f32; 4],
     child: [Child; 4],
+}
+
+/// A part of a tree that is being rebuilt.
+#[derive(Clone, Copy)]
+struct Part {
+    child: Child,
+    prob: f64,
+    /// Levels of nodes, without those that divide a leaf only now.
+    height: u32,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -193,7 +206,7 @@ impl Quadtree {
         let total = self.mass();
         let mut next = Self { nodes: vec![], leaves: vec![], starts: vec![] };
         if total > 0.0 && total.is_finite() {
-            self.rebuild(&mut next, Child::Node(0), 1.0, 0, (total, uniform));
+            self.rebuild(&mut next, Child::Node(0), (1.0, 0), (total, uniform));
             next.tabulate();
             next
         } else {
@@ -201,13 +214,13 @@ impl Quadtree {
         }
     }
 
-    /// Rebuilds `child` in `next`: its index there and its probability.
-    fn rebuild(&self, next: &mut Self, child: Child, area: f64, depth: u32, mix: (f64, f64)) -> (Child, f64) {
+    /// Rebuilds `child` of this area and depth in `next`.
+    fn rebuild(&self, next: &mut Self, child: Child, (area, depth): (f64, u32), mix: (f64, f64)) -> Part {
         let (total, uniform) = mix;
         let leaf = match child {
             Child::Node(node) => {
                 let children = self.nodes[node as usize].child;
-                return next.inner(|next, q| self.rebuild(next, children[q], area / 4.0, depth + 1, mix));
+                return next.inner(|next, q| self.rebuild(next, children[q], (area / 4.0, depth + 1), mix));
             }
             Child::Leaf(leaf) => self.leaves[leaf as usize],
         };
@@ -215,9 +228,9 @@ impl Quadtree {
         let prob = (1.0 - uniform) * share + uniform * area;
         if share > SPLIT_SHARE && leaf.count >= SPLIT_COUNT && depth < DEEPEST {
             let quarter = Leaf { moment: MEMORY * leaf.moment / 4.0, count: 0 };
-            return next.inner(|next, _| (next.leaf(quarter), prob / 4.0));
+            return Part { height: 0, ..next.inner(|next, _| Part { child: next.leaf(quarter), prob: prob / 4.0, height: 0 }) };
         }
-        (next.leaf(Leaf { moment: MEMORY * leaf.moment, count: 0 }), prob)
+        Part { child: next.leaf(Leaf { moment: MEMORY * leaf.moment, count: 0 }), prob, height: 0 }
     }
 
     fn leaf(&mut self, leaf: Leaf) -> Child {
@@ -225,15 +238,18 @@ impl Quadtree {
         Child::Leaf(self.leaves.len() as u32 - 1)
     }
 
-    /// An inner node of four parts, each with its probability.
-    fn inner(&mut self, mut part: impl FnMut(&mut Self, usize) -> (Child, f64)) -> (Child, f64) {
+    /// An inner node of four parts.
+    fn inner(&mut self, mut part: impl FnMut(&mut Self, usize) -> Part) -> Part {
         let index = self.nodes.len();
         self.nodes.push(Node { prob: [0.25; 4], child: [Child::Leaf(0); 4] });
-        let parts: [(Child, f64); 4] = std::array::from_fn(|quarter| part(self, quarter));
-        let sum: f64 = parts.iter().map(|p| p.1).sum();
-        let prob = if sum > 0.0 { parts.map(|p| (p.1 / sum) as f32) } else { [0.25; 4] };
-        self.nodes[index] = Node { prob, child: parts.map(|p| p.0) };
-        (Child::Node(index as u32), sum)
+        let parts: [Part; 4] = std::array::from_fn(|quarter| part(self, quarter));
+        let sum: f64 = parts.iter().map(|p| p.prob).sum();
+        let height = parts.iter().map(|p| p.height).max().unwrap_or(0);
+        let shared = SHARED * 0.5f64.powi(height as i32);
+        let prob = |p: Part| ((1.0 - shared) * p.prob / sum + 0.25 * shared) as f32;
+        let prob = if sum > 0.0 { parts.map(prob) } else { [0.25; 4] };
+        self.nodes[index] = Node { prob, child: parts.map(|p| p.child) };
+        Part { child: Child::Node(index as u32), prob: sum, height: height + 1 }
     }
 }
 
@@ -293,6 +309,36 @@ mod tests {
         let mut random = Random::new(Family::Other, 2, 0, 5);
         let hits = (0..10_000).filter(|_| ridge(tree.sample(random.unit2()).0) > 0.0).count();
         assert!(hits > 2_000, "{hits} of 10000 samples hit a ridge of a hundredth of the square");
+    }
+
+    #[test]
+    fn a_gap_among_what_is_found_stays_open() {
+        // A place as small as a pool seen from its sun, in which a corner has found nothing for some rounds.
+        let (corner, side) = (Vec2::new(0.3125, 0.625), 0.015_625);
+        let inside = |at: Vec2, from: Vec2, side: f32| (at - from).min_element() >= 0.0 && (at - from).max_element() < side;
+        let gap = |at| inside(at, corner, side / 8.0);
+        let mut tree = Quadtree::default();
+        let mut random = Random::new(Family::Other, 3, 0, 5);
+        for round in 0..14 {
+            for _ in 0..20_000 {
+                let at = corner + side * random.unit2();
+                if round < 6 || !gap(at) {
+                    tree.learn(at, 1.0 / f64::from(tree.density(at)));
+                }
+            }
+            tree = tree.refined(0.0);
+        }
+        let mean = |from: Vec2, side: f32| {
+            (0..256)
+                .map(|i| f64::from(tree.density(from + side * (Vec2::new((i % 16) as f32, (i / 16) as f32) + 0.5) / 16.0)))
+                .sum::<f64>()
+                / 256.0
+        };
+        let (gap, all) = (mean(corner, side / 8.0), mean(corner, side));
+        assert!(gap > 0.01 * all, "{gap} in the gap, {all} around it");
+        // What is shared stays near: most of the density is still inside.
+        let within = all * f64::from(side * side);
+        assert!(within > 0.95, "{within}");
     }
 
     #[test]
