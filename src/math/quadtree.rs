@@ -4,7 +4,7 @@
 //! Leaves carry the second moment of what was found in them; the density that makes the variance of
 //! an estimator `f/p` least is `p ∝ √E[f²]` leaf by leaf [Pharr 2023, sec. 2.2.2; Rath 2020]. A part
 //! of the uniform density can be mixed in, since a leaf that is never sampled never learns; where all that matters is small,
-//! a mean over the whole square is next to nothing there, and what helps is that nodes share with their neighbours ([`SHARED`]).
+//! a mean over the whole square is next to nothing there, and what helps is that nodes share with their neighbours (`SHARED`).
 //! Descending the tree stretches `u` (no alias tables), which keeps the stratification of
 //! low-discrepancy points.
 
