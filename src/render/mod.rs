@@ -275,7 +275,8 @@ fn usual_group(done: u64, shoots: bool, in_time: Option<(Duration, Duration)>) -
         // Nothing couples the passes of pure gathering: several at a time stay in the cache.
         (false, None) => 4,
         (false, Some(_)) => 2,
-        // Points of a sequence come in pairs, and one of two lights for each: an odd one out may bring more noise than it takes.
+        // Points of a sequence come in pairs, and where one of two lights is picked, each for one: an odd one out may bring more noise
+        // than it takes.
         (true, Some((pass, all))) if done > 0 && PAIRS_IN_TIME * 2 * pass <= all => 2 - done % 2,
         (true, _) => 1,
     }

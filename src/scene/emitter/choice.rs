@@ -22,6 +22,8 @@ const UNIFORM_EMISSION: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub(super) struct Choice {
     pub(super) next_event: NextEventChoice,
+    /// All that may be picked for a next event, where two to [`ALL_SEEN`] may.
+    few: Vec<Picked>,
     pub(super) emission: Discrete,
 }
 
@@ -37,20 +39,22 @@ impl Choice {
     /// From the power of every emitter (0 = never chosen), 1/(πR²) of the scene's sphere and the bounds
     /// of the finite emitters; `None` where all are dark.
     pub(super) fn new(powers: &[f64], p_across: f32, bound: impl Fn(usize) -> Option<Bound>) -> Option<Self> {
-        let lit = powers.iter().filter(|p| **p > 0.0).count();
-        let next_event = if lit <= FEW {
-            NextEventChoice::Few(mixture(powers, 1.0)?)
+        let lit: Vec<usize> = (0..powers.len()).filter(|i| powers[*i] > 0.0).collect();
+        let (next_event, few) = if lit.len() <= FEW {
+            let choice = mixture(powers, 1.0)?;
+            let all = (2..=ALL_SEEN).contains(&lit.len());
+            let few = if all { lit.iter().map(|i| (*i, choice.prob(*i))).collect() } else { vec![] };
+            (NextEventChoice::Few(choice), few)
         } else {
-            NextEventChoice::Many(Box::new(Many::new(powers, p_across, bound)?))
+            (NextEventChoice::Many(Box::new(Many::new(powers, p_across, bound)?)), vec![])
         };
-        Some(Self { next_event, emission: mixture(powers, UNIFORM_EMISSION)? })
+        Some(Self { next_event, few, emission: mixture(powers, UNIFORM_EMISSION)? })
     }
 
-    /// Every emitter that may be picked for a next event, where two to [`ALL_SEEN`] may.
-    pub(super) fn few(&self) -> Vec<Picked> {
-        let NextEventChoice::Few(discrete) = &self.next_event else { return vec![] };
-        let lit: Vec<Picked> = (0..discrete.len()).map(|i| (i, discrete.prob(i))).filter(|(_, prob)| *prob > 0.0).collect();
-        if (2..=ALL_SEEN).contains(&lit.len()) { lit } else { vec![] }
+    /// See [`Lights::few`](super::Lights::few).
+    #[inline]
+    pub(super) fn few(&self) -> &[Picked] {
+        &self.few
     }
 
     /// The tree of finite emitters, if they are many.

@@ -25,8 +25,6 @@ pub struct Lights {
     /// Ambient terms of local illumination.
     pub(super) ambient: Vec<(EmitterId, Spectrum)>,
     pub(super) choice: Option<Choice>,
-    /// See [`Lights::few`].
-    pub(super) few: Vec<Picked>,
     /// Centre of the sphere around the scene.
     pub(super) center: Vec3,
     /// Its radius R.
@@ -49,7 +47,7 @@ impl Lights {
     /// expectation, the sum over all of [`Self::next_event_from`] times the probability of the pick.
     #[inline]
     pub fn few(&self) -> &[Picked] {
-        &self.few
+        self.choice.as_ref().map_or(&[], Choice::few)
     }
 
     /// The same from one emitter, of which ν is then the density without any choice.

@@ -42,7 +42,6 @@ impl Lights {
         };
         let powers: Vec<f64> = self.emitters.iter().zip(&self.infos).map(power).collect();
         self.choice = Choice::new(&powers, self.p_across, |i| self.bound(i, powers[i]));
-        self.few = self.choice.as_ref().map_or_else(Vec::new, Choice::few);
         for (i, info) in self.infos.iter_mut().enumerate() {
             info.prob_next_event = self.choice.as_ref().map_or(0.0, |c| c.next_event.prob_anywhere(i));
             info.prob_emission = self.choice.as_ref().map_or(0.0, |c| c.emission.prob(i));
