@@ -110,9 +110,9 @@ impl Candidate {
         let (eye, light) = (&found.eye, &found.light);
         let c = COSTS;
         let on = |b: bool, cost: f64| if b { cost } else { 0.0 };
-        let at_eye = on(self.next_event, c.next_event) + on(self.connect, c.connect);
+        let joins = on(self.next_event, c.next_event * eye.next_events) + on(self.connect, c.connect * eye.ends);
         let at_light = c.splat + on(self.connect, c.keep);
-        let gathering = c.gather_walk + c.gather_step * eye.steps + at_eye * eye.ends + on(self.merge, c.merge * merges);
+        let gathering = c.gather_walk + c.gather_step * eye.steps + joins + on(self.merge, c.merge * merges);
         [gathering, self.light_paths * (c.shoot_walk + c.shoot_step * light.steps + at_light * light.ends)]
     }
 

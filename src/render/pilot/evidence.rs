@@ -6,7 +6,7 @@ use super::{JOB, Pilot};
 use crate::math::random::Family;
 use crate::math::{Random, limit};
 use crate::render::passes::GATHER_AXES;
-use crate::scene::Surface;
+use crate::scene::{Scene, Surface};
 use crate::transport::cache::{LightCache, LightVertex};
 use crate::transport::gather::gather;
 use crate::transport::reference::{JoinKey, Path, Subpath, Testimony, Witness, products};
@@ -34,6 +34,8 @@ pub(super) struct Counts {
     pub(super) steps: f64,
     /// Vertices at which walks can be joined.
     pub(super) ends: f64,
+    /// Light points that these ask for.
+    pub(super) next_events: f64,
 }
 
 /// What one path found by the mixture tells.
@@ -94,16 +96,21 @@ struct Watch {
     chains: Vec<(usize, f32)>,
     /// The vertex last reached has not scattered.
     pending: bool,
+    /// The picture shows the vertex,
+    clear: bool,
+    /// which asks for so many light points then.
+    few: f64,
 }
 impl Observe for Watch {
     fn started(&mut self, from: Vec3, light: Option<&crate::scene::emitter::Emission>) {
         self.counts.walks += 1.0;
         self.pending = false;
+        self.clear = true;
         self.share = None;
         self.witness.started(from, light);
     }
     fn arrived(&mut self, surface: &Surface) {
-        self.counts.ends += 1.0;
+        self.count_ends(1.0);
         self.pending = true;
         self.witness.arrived(surface);
     }
@@ -111,14 +118,20 @@ impl Observe for Watch {
         self.witness.cached(vertex);
     }
     fn scattered(&mut self, s: &Scatter) {
-        self.counts.ends -= if s.delta { 1.0 } else { 0.0 };
+        if s.delta {
+            self.count_ends(-1.0);
+        }
         self.pending = false;
+        self.clear &= s.breadth.is_focused();
         self.witness.scattered(s);
     }
     fn returned(&mut self, vertices: usize) {
-        // Nothing is joined at the end of a branch.
-        self.counts.ends -= if self.pending { 1.0 } else { 0.0 };
+        // Nothing is joined at the end of a branch, and none begins but behind mirrors and glass.
+        if self.pending {
+            self.count_ends(-1.0);
+        }
         self.pending = false;
+        self.clear = true;
         self.share = None;
         self.witness.returned(vertices);
     }
@@ -136,8 +149,15 @@ impl Observe for Watch {
 }
 
 impl Watch {
-    fn new(witness: Witness) -> Self {
-        Self { witness, counts: Counts::default(), branches: BranchRays::default(), share: None, chains: vec![], pending: false }
+    fn new(witness: Witness, scene: &Scene) -> Self {
+        let (counts, branches, share, chains) = (Counts::default(), BranchRays::default(), None, vec![]);
+        let few = scene.lights.few().len().max(1) as f64;
+        Self { witness, counts, branches, share, chains, pending: false, clear: true, few }
+    }
+
+    fn count_ends(&mut self, n: f64) {
+        self.counts.ends += n;
+        self.counts.next_events += n * if self.clear { self.few } else { 1.0 };
     }
 }
 
@@ -165,6 +185,7 @@ impl Found {
         self.counts.walks += other.counts.walks;
         self.counts.steps += other.counts.steps;
         self.counts.ends += other.counts.ends;
+        self.counts.next_events += other.counts.next_events;
         self.merges.clear += other.merges.clear;
         self.merges.by_chance += other.merges.by_chance;
         self.branches.join(other.branches);
@@ -172,8 +193,9 @@ impl Found {
     }
 
     fn per_walk(&self) -> Counts {
-        let Counts { walks, steps, ends } = self.counts;
-        Counts { walks, steps: steps / walks.max(1.0), ends: ends / walks.max(1.0) }
+        let Counts { walks, steps, ends, next_events } = self.counts;
+        let [steps, ends, next_events] = [steps, ends, next_events].map(|n| n / walks.max(1.0));
+        Counts { walks, steps, ends, next_events }
     }
 }
 
@@ -245,7 +267,7 @@ fn shot(
         .into_par_iter()
         .map(|job| {
             let cx = Context::new(pilot.scene, plan, 0);
-            let mut watch = Watch::new(Witness::default());
+            let mut watch = Watch::new(Witness::default(), pilot.scene);
             watch.witness.expect_shooting(true);
             let (mut vertices, mut splats, mut rays) = (vec![], Splats(vec![]), RayCounts::default());
             for index in job * JOB..((job + 1) * JOB).min(paths) {
@@ -284,7 +306,7 @@ fn gathered(
         .into_par_iter()
         .map(|job| {
             let cx = Context::new(pilot.scene, plan, 0);
-            let mut watch = Watch::new(Witness::with_subpaths(subpaths.clone()));
+            let mut watch = Watch::new(Witness::with_subpaths(subpaths.clone()), pilot.scene);
             let mut rays = RayCounts::default();
             let (mut found, mut merges) = (vec![], Merges::default());
             for index in job * JOB..((job + 1) * JOB).min(walks) {
