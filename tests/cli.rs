@@ -38,7 +38,7 @@ const SCENE: &str = r#"<scene version="3.0.0">
     </shape>
     <shape type="sphere">
         <point name="center" value="0, 2.5, 0"/><float name="radius" value="0.5"/>
-        <emitter type="area"><rgb name="radiance" value="5, 5, 5"/></emitter>
+        <bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="5, 5, 5"/></emitter>
     </shape>
 </scene>
 "#;
@@ -486,7 +486,7 @@ fn the_longest_path_is_chosen_and_explained() {
     assert_eq!((&json["max_length"], &json["truncation"]["a_priori"]), (&13.into(), &true.into()), "{json}");
     let glass = std::fs::read_to_string(&long)
         .expect("the scene")
-        .replace("<point name=\"center\"", "<bsdf type=\"dielectric\"/><point name=\"center\"");
+        .replace("<bsdf type=\"diffuse\"/><emitter", "<bsdf type=\"dielectric\"/><emitter");
     std::fs::write(room.path("glass.xml"), glass).expect("the scene is written");
     let (code, _, err) = render(&room.path("glass.xml"), &[]);
     assert_eq!(code, 0, "{err}");

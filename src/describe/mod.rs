@@ -329,6 +329,8 @@ pub enum BsdfModel {
         diffuse_reflectance: TextureDescription,
         specular_reflectance: TextureDescription,
     },
+    /// The principled model [Burley 2012; Burley 2015]; `eta` is the index inside over that outside.
+    Principled { parameters: Box<PrincipledDescription> },
     /// `front` seen from the side of the normal, `back` from the other.
     TwoSided { front: BsdfId, back: BsdfId },
     /// `inner` with probability `opacity`, else straight through.
@@ -337,6 +339,69 @@ pub enum BsdfModel {
     Null,
     /// `(1 − weight)·first + weight·second`.
     Blend { weight: TextureDescription, first: BsdfId, second: BsdfId },
+}
+
+/// Parameters of the principled model.
+#[allow(missing_docs)]
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrincipledDescription {
+    pub base_color: TextureDescription,
+    pub roughness: TextureDescription,
+    pub anisotropic: TextureDescription,
+    pub metallic: TextureDescription,
+    pub spec_trans: TextureDescription,
+    pub spec_tint: TextureDescription,
+    pub sheen: TextureDescription,
+    pub sheen_tint: TextureDescription,
+    pub flatness: TextureDescription,
+    pub clearcoat: TextureDescription,
+    pub clearcoat_gloss: TextureDescription,
+    pub eta: f32,
+}
+
+impl Default for PrincipledDescription {
+    /// Mitsuba's defaults.
+    fn default() -> Self {
+        let [half, none] = [0.5, 0.0].map(TextureDescription::grey);
+        Self {
+            base_color: half.clone(),
+            roughness: half,
+            anisotropic: none.clone(),
+            metallic: none.clone(),
+            spec_trans: none.clone(),
+            spec_tint: none.clone(),
+            sheen: none.clone(),
+            sheen_tint: none.clone(),
+            flatness: none.clone(),
+            clearcoat: none.clone(),
+            clearcoat_gloss: none,
+            eta: Self::eta(0.5),
+        }
+    }
+}
+
+impl PrincipledDescription {
+    /// All textures with their names.
+    pub fn textures(&self) -> [(&'static str, &TextureDescription); 11] {
+        [
+            ("base_color", &self.base_color),
+            ("roughness", &self.roughness),
+            ("anisotropic", &self.anisotropic),
+            ("metallic", &self.metallic),
+            ("spec_trans", &self.spec_trans),
+            ("spec_tint", &self.spec_tint),
+            ("sheen", &self.sheen),
+            ("sheen_tint", &self.sheen_tint),
+            ("flatness", &self.flatness),
+            ("clearcoat", &self.clearcoat),
+            ("clearcoat_gloss", &self.clearcoat_gloss),
+        ]
+    }
+
+    /// The index of a `specular` below 12.5: that whose reflection at normal incidence is 0.08 of it.
+    pub fn eta(specular: f32) -> f32 {
+        2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0
+    }
 }
 
 /// A shape with its local model and emission.
@@ -350,7 +415,7 @@ pub struct ShapeDescription {
     pub to_world: Placed<Mat4>,
     /// Normals point the other way.
     pub flip_normals: bool,
-    /// Local model; `None` = Mitsuba's default (diffuse 0.5).
+    /// Local model; `None` = Mitsuba's default: diffuse 0.5, black for a lamp.
     pub bsdf: Option<BsdfId>,
     /// Area emitter on the side of the normal.
     pub emission: Option<AreaEmission>,

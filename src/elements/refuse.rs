@@ -50,6 +50,7 @@ fn name(model: &BsdfModel) -> &'static str {
         BsdfModel::RoughConductor { .. } => "roughconductor",
         BsdfModel::Plastic { .. } => "plastic",
         BsdfModel::RoughPlastic { .. } => "roughplastic",
+        BsdfModel::Principled { .. } => "principled",
         BsdfModel::TwoSided { .. } => "twosided",
         BsdfModel::Mask { .. } => "mask",
         BsdfModel::Null => "null",

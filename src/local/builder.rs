@@ -8,7 +8,7 @@ use super::microfacet::Microfacet;
 use super::rough_conductor::RoughnessModel;
 use super::rough_plastic::Coat;
 use super::{
-    blend, conductor, dielectric, diffuse, mask, null, plastic, rough_conductor, rough_dielectric, rough_plastic,
+    blend, conductor, dielectric, diffuse, mask, null, plastic, principled, rough_conductor, rough_dielectric, rough_plastic,
     thin_dielectric, two_sided,
 };
 use crate::describe::{
@@ -215,6 +215,23 @@ impl<'a> Builder<'a> {
                 }
                 let coat = self.coat(*distribution, *alpha, eta);
                 rough_plastic::Model::new(coat, *nonlinear, [diffuse, specular], &self.textures).into()
+            }
+            BsdfModel::Principled { parameters: p } => {
+                let parameters = principled::Parameters {
+                    base_color: self.texture(&p.base_color, "base_color", place),
+                    roughness: self.texture(&p.roughness, "roughness", place),
+                    anisotropic: self.texture(&p.anisotropic, "anisotropic", place),
+                    metallic: self.texture(&p.metallic, "metallic", place),
+                    spec_trans: self.texture(&p.spec_trans, "spec_trans", place),
+                    spec_tint: self.texture(&p.spec_tint, "spec_tint", place),
+                    sheen: self.texture(&p.sheen, "sheen", place),
+                    sheen_tint: self.texture(&p.sheen_tint, "sheen_tint", place),
+                    flatness: self.texture(&p.flatness, "flatness", place),
+                    clearcoat: self.texture(&p.clearcoat, "clearcoat", place),
+                    clearcoat_gloss: self.texture(&p.clearcoat_gloss, "clearcoat_gloss", place),
+                };
+                let eta = self.eta(p.eta, 1.0, true, place)?;
+                principled::Model::new(parameters, eta, &self.textures).into()
             }
             BsdfModel::Null => null::Model.into(),
             // The three that combine others are taken apart before this is asked.

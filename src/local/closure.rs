@@ -6,8 +6,8 @@
 
 use super::composite::Composite;
 use super::{
-    Equation, Evaluation, Lobe, Lobes, Sample, Textured, conductor, dielectric, diffuse, null, plastic, rough_conductor,
-    rough_dielectric, rough_plastic, thin_dielectric,
+    Equation, Evaluation, Lobe, Lobes, Sample, Textured, conductor, dielectric, diffuse, null, plastic, principled,
+    rough_conductor, rough_dielectric, rough_plastic, thin_dielectric,
 };
 use crate::math::warp::ONE_MINUS_EPSILON;
 use crate::spectrum::Spectrum;
@@ -150,11 +150,12 @@ closed_set! { 'a:
     RoughConductor of rough_conductor at a point rough_conductor::RoughConductor;
     Plastic of plastic at a point plastic::Plastic;
     RoughPlastic of rough_plastic at a point rough_plastic::RoughPlastic<'a>;
+    Principled of principled at a point principled::Principled;
     Null of null at a point null::Null;
 }
 
 /// Name of every model in a scene file with the source of its file, whose head is its manual.
-pub const MODEL_SOURCES: [(&str, &str); 12] = [
+pub const MODEL_SOURCES: [(&str, &str); 13] = [
     ("diffuse", include_str!("diffuse.rs")),
     ("dielectric", include_str!("dielectric.rs")),
     ("thindielectric", include_str!("thin_dielectric.rs")),
@@ -163,6 +164,7 @@ pub const MODEL_SOURCES: [(&str, &str); 12] = [
     ("roughconductor", include_str!("rough_conductor.rs")),
     ("plastic", include_str!("plastic.rs")),
     ("roughplastic", include_str!("rough_plastic.rs")),
+    ("principled", include_str!("principled.rs")),
     ("twosided", include_str!("two_sided.rs")),
     ("mask", include_str!("mask.rs")),
     ("null", include_str!("null.rs")),

@@ -139,8 +139,8 @@ pub struct Materials {
 }
 
 impl Materials {
-    /// Of all described models; material k is model k, and one more (see [`Self::default_id`])
-    /// follows. `images` must be decoded.
+    /// Of all described models; material k is model k, and two more (see [`Self::default_id`])
+    /// follow. `images` must be decoded.
     pub fn build(bsdfs: &[BsdfDescription], images: &[ImageDescription]) -> Result<Self, Problems> {
         let mut builder = Builder::new(bsdfs, images);
         let mut materials = Self { sides: Vec::new(), summaries: Vec::new(), textures: Textures::default() };
@@ -151,6 +151,7 @@ impl Materials {
         }
         let grey = diffuse::Model { reflectance: TextureSlot::Constant(Spectrum::grey(0.5)) };
         materials.push(Side::Single(grey.into()), Side::Black, false, &builder.textures);
+        materials.push(Side::Black, Side::Black, false, &builder.textures);
         if builder.problems.has_errors() {
             return Err(builder.problems);
         }
@@ -176,19 +177,19 @@ impl Materials {
         self.textures.bytes()
     }
 
-    /// Number of materials, the default one included.
+    /// Number of materials, the default ones included.
     pub fn len(&self) -> usize {
         self.summaries.len()
     }
 
-    /// Never: there is always the default one.
+    /// Never: there are always the default ones.
     pub fn is_empty(&self) -> bool {
         self.summaries.is_empty()
     }
 
-    /// The material of shapes without one: diffuse, 0.5, one-sided.
-    pub fn default_id(&self) -> MaterialId {
-        MaterialId(self.summaries.len() as u32 - 1)
+    /// The material of shapes without one: diffuse, 0.5, one-sided; of lamps, which in Mitsuba 3 reflect nothing then, black.
+    pub fn default_id(&self, is_lamp: bool) -> MaterialId {
+        MaterialId(self.summaries.len() as u32 - if is_lamp { 1 } else { 2 })
     }
 
     /// The model at texture coordinates `uv`, for events that come from `w_back` on the side of the

@@ -25,6 +25,7 @@ mod material;
 pub mod microfacet;
 pub mod null;
 pub mod plastic;
+pub mod principled;
 pub mod rough_conductor;
 pub mod rough_dielectric;
 pub mod rough_plastic;

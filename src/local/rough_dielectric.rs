@@ -74,19 +74,22 @@ impl Textured for Model {
 }
 
 /// A facet that connects two directions.
-struct Facet {
-    d: f32,
+pub(super) struct Facet {
+    /// D(m).
+    pub d: f32,
     /// w_back·m and w_next·m.
-    cos_back: f32,
-    cos_next: f32,
-    b: Boundary,
-    reflects: bool,
+    pub cos_back: f32,
+    pub cos_next: f32,
+    /// What it is for w_back.
+    pub b: Boundary,
+    /// Both directions are on the same side of the surface.
+    pub reflects: bool,
 }
 
-impl RoughDielectric {
-    /// The facet that turns `w_back` into `w_next`, where there is one.
+impl Facet {
+    /// The facet that turns `w_back` into `w_next`, where there is one; with the index inside over that outside, and its inverse.
     #[inline]
-    fn facet(&self, w_back: Vec3, w_next: Vec3) -> Option<Facet> {
+    pub fn between(facets: &Microfacet, [eta, inv_eta]: [f32; 2], w_back: Vec3, w_next: Vec3) -> Option<Self> {
         let side = w_back.z * w_next.z;
         if side == 0.0 {
             return None;
@@ -94,8 +97,8 @@ impl RoughDielectric {
         let reflects = side > 0.0;
         let scale = match (reflects, w_back.z > 0.0) {
             (true, _) => 1.0,
-            (false, true) => self.eta,
-            (false, false) => self.inv_eta,
+            (false, true) => eta,
+            (false, false) => inv_eta,
         };
         let m = (w_back + w_next * scale).normalize_or_zero();
         let m = if m.z < 0.0 { -m } else { m };
@@ -104,20 +107,55 @@ impl RoughDielectric {
         if !(cos_back * w_back.z > 0.0 && cos_next * w_next.z > 0.0) {
             return None;
         }
-        Some(Facet { d: self.facets.d(m), cos_back, cos_next, b: boundary(cos_back, self.eta, self.inv_eta), reflects })
+        Some(Self { d: facets.d(m), cos_back, cos_next, b: boundary(cos_back, eta, inv_eta), reflects })
     }
 
-    /// `D(m)` times the Jacobian and the probability of the lobe, without masking: the factor that
-    /// both densities share.
+    /// One visible from `w_back`, and the direction into which it mirrors or refracts, as `reflects` decides by what it is and
+    /// by w_back·m.
     #[inline]
-    fn shared_density(facet: &Facet) -> f32 {
-        if facet.reflects {
-            return 0.25 * facet.d * facet.b.reflected;
+    pub fn sample(
+        facets: &Microfacet,
+        [eta, inv_eta]: [f32; 2],
+        w_back: Vec3,
+        u: Vec2,
+        reflects: impl FnOnce(&Boundary, f32) -> bool,
+    ) -> Option<(Vec3, Self)> {
+        let m = facets.sample_visible(if w_back.z < 0.0 { -w_back } else { w_back }, u);
+        let cos_back = w_back.dot(m);
+        let b = boundary(cos_back, eta, inv_eta);
+        let reflects = reflects(&b, cos_back);
+        let w_next = if reflects { 2.0 * cos_back * m - w_back } else { b.refract_at(w_back, m, cos_back) };
+        let cos_next = w_next.dot(m);
+        let same_side = w_back.z * w_next.z > 0.0;
+        if !(cos_back * w_back.z > 0.0 && cos_next * w_next.z > 0.0 && same_side == reflects) {
+            return None;
         }
-        let root = facet.cos_back + facet.b.eta * facet.cos_next;
-        let product = (facet.cos_back * facet.cos_next).abs();
+        Some((w_next, Self { d: facets.d(m), cos_back, cos_next, b, reflects }))
+    }
+
+    /// `D(m)` times the Jacobian, without masking and the share of light: the factor that both densities share.
+    #[inline]
+    pub fn density(&self) -> f32 {
+        if self.reflects {
+            return 0.25 * self.d;
+        }
+        let root = self.cos_back + self.b.eta * self.cos_next;
+        let product = (self.cos_back * self.cos_next).abs();
         // Without refraction (index 1) no facet can be told from the two directions.
-        if root == 0.0 { 0.0 } else { facet.d * (1.0 - facet.b.reflected) * product / (root * root) }
+        if root == 0.0 { 0.0 } else { self.d * product / (root * root) }
+    }
+
+    /// The same times the share of light of a dielectric.
+    #[inline]
+    fn shared_density(&self) -> f32 {
+        self.density() * if self.reflects { self.b.reflected } else { 1.0 - self.b.reflected }
+    }
+}
+
+impl RoughDielectric {
+    #[inline]
+    fn facet(&self, w_back: Vec3, w_next: Vec3) -> Option<Facet> {
+        Facet::between(&self.facets, [self.eta, self.inv_eta], w_back, w_next)
     }
 }
 
@@ -125,7 +163,7 @@ impl Lobe for RoughDielectric {
     #[inline]
     fn evaluate(&self, equation: Equation, w_back: Vec3, w_next: Vec3) -> Evaluation {
         let Some(facet) = self.facet(w_back, w_next) else { return Evaluation::default() };
-        let shared = Self::shared_density(&facet);
+        let shared = facet.shared_density();
         let (back, next) = (self.facets.masking(w_back), self.facets.masking(w_next));
         let eta2 = facet.b.eta * facet.b.eta;
         let (scale, p_scale, n_o2) = match (facet.reflects, equation) {
@@ -144,7 +182,7 @@ impl Lobe for RoughDielectric {
     fn density(&self, w_back: Vec3, w_next: Vec3) -> f32 {
         let Some(facet) = self.facet(w_back, w_next) else { return 0.0 };
         let p_scale = if facet.reflects { 1.0 } else { facet.b.eta * facet.b.eta };
-        Self::shared_density(&facet) * self.facets.masking(w_back).visible * p_scale
+        facet.shared_density() * self.facets.masking(w_back).visible * p_scale
     }
 
     #[inline]
@@ -152,18 +190,10 @@ impl Lobe for RoughDielectric {
         if w_back.z == 0.0 {
             return None;
         }
-        let m = self.facets.sample_visible(if w_back.z < 0.0 { -w_back } else { w_back }, u);
-        let cos_back = w_back.dot(m);
-        let b = boundary(cos_back, self.eta, self.inv_eta);
-        let reflects = u_lobe < b.reflected;
-        let w_next = if reflects { 2.0 * cos_back * m - w_back } else { b.refract_at(w_back, m, cos_back) };
-        let cos_next = w_next.dot(m);
-        let same_side = w_back.z * w_next.z > 0.0;
-        if !(cos_back * w_back.z > 0.0 && cos_next * w_next.z > 0.0 && same_side == reflects) {
-            return None;
-        }
-        let facet = Facet { d: self.facets.d(m), cos_back, cos_next, b, reflects };
-        let shared = Self::shared_density(&facet);
+        let eta = [self.eta, self.inv_eta];
+        let (w_next, facet) = Facet::sample(&self.facets, eta, w_back, u, |b, _| u_lobe < b.reflected)?;
+        let (b, reflects) = (facet.b, facet.reflects);
+        let shared = facet.shared_density();
         let (back, next) = (self.facets.masking(w_back), self.facets.masking(w_next));
         let masked = back.ratio * next.g() * w_next.z.abs();
         let (weight, p_scale, eta) = match (reflects, equation) {

@@ -24,7 +24,7 @@ pub struct SceneInfo {
     pub triangles: usize,
     /// Placed copies of groups.
     pub instances: usize,
-    /// Local models, the default one included.
+    /// Local models that shapes have.
     pub materials: usize,
     /// Corners of the box around all shapes; `None` without shapes.
     pub bounds: Option<(Vec3, Vec3)>,
@@ -93,7 +93,7 @@ impl Scene {
             shapes: self.geometry.shape_count(),
             triangles: self.geometry.triangle_count(),
             instances: self.geometry.instance_count(),
-            materials: self.materials.len(),
+            materials: self.used_materials.len(),
             bounds: (!bounds.is_empty()).then_some((bounds.min, bounds.max)),
             emitters: self.lights.infos().to_vec(),
             geometry_bytes: self.geometry.bytes(),
@@ -170,7 +170,7 @@ fn input(
             return None;
         }
         (Some(id), Some(_)) => MaterialId(id.0),
-        (None, Some(materials)) => materials.default_id(),
+        (None, Some(materials)) => materials.default_id(shape.emission.is_some()),
         (_, None) => MaterialId(0),
     };
     Some(ShapeInput {

@@ -137,6 +137,9 @@ structs! {
     SensorDescription { model, to_world, near_clip, far_clip, film; id, sample_count, seed, place }
     FilmDescription { width, height, crop, filter; place }
     BsdfDescription { model; id, place }
+    PrincipledDescription {
+        base_color, roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_gloss, eta;
+    }
     ShapeDescription { model, to_world, flip_normals, bsdf, emission; id, place }
     AreaEmission { radiance; id, place }
     GroupDescription { shapes; id, place }
@@ -170,6 +173,7 @@ enums! {
         RoughConductor { distribution, alpha_u, alpha_v, perfect, eta, k, specular_reflectance }
         Plastic { int_ior, ext_ior, nonlinear, diffuse_reflectance, specular_reflectance }
         RoughPlastic { distribution, alpha, int_ior, ext_ior, nonlinear, diffuse_reflectance, specular_reflectance }
+        Principled { parameters }
         TwoSided { front, back }
         Mask { opacity, inner }
         Null {}

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::describe::*;
+use crate::spectrum::Spectrum;
 use geometry::Ray;
 use glam::Mat4;
 use std::path::PathBuf;
@@ -90,9 +91,12 @@ fn ids_point_to_what_was_described() {
     let floor = down(-3.0, 4.0, 3.0);
     assert_eq!((floor.shape, floor.material, floor.emitter), (1, MaterialId(0), EmitterId::NONE));
     let triangle = down(0.2, 0.2, 3.0);
-    assert_eq!((triangle.shape, triangle.material), (0, scene.materials.default_id()));
+    assert_eq!((triangle.shape, triangle.material), (0, scene.materials.default_id(false)));
     let disk = down(0.1, 0.2, 5.0);
     assert_eq!((disk.shape, disk.emitter), (2, EmitterId(0)));
+    // As in Mitsuba 3, a lamp without a model reflects nothing.
+    assert_eq!(disk.material, scene.materials.default_id(true));
+    assert_eq!(scene.materials.albedo_bound(disk.material), Spectrum::BLACK);
     let point = emitter::EmitterPoint::on_surface(&disk);
     assert_eq!(scene.lights.radiance(&point, -Vec3::Z).to_rgb(), [2.0; 3]);
     assert!(scene.lights.radiance(&point, Vec3::Z).is_black());
@@ -103,7 +107,7 @@ fn ids_point_to_what_was_described() {
 fn info_counts() {
     let scene = built(&description());
     let info = scene.info();
-    assert_eq!((info.shapes, info.triangles, info.instances, info.materials), (6, 3, 2, 2));
+    assert_eq!((info.shapes, info.triangles, info.instances, info.materials), (6, 3, 2, 3));
     assert_eq!(info.emitters.iter().map(|e| e.kind).collect::<Vec<_>>(), ["area", "point"]);
     assert_eq!(info.emitters[0].id.as_deref(), Some("lamp"));
     let pi = std::f32::consts::PI;

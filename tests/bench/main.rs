@@ -32,7 +32,7 @@ const SCENE: &str = r#"<scene version="3.0.0">
     </shape>
     <shape type="sphere">
         <point name="center" value="-1, 2, 0"/><float name="radius" value="0.4"/>
-        <emitter type="area"><rgb name="radiance" value="5, 5, 5"/></emitter>
+        <bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="5, 5, 5"/></emitter>
     </shape>
 </scene>
 "#;

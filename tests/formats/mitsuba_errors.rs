@@ -70,7 +70,7 @@ fn unknown_names_get_the_nearest_known() {
 #[test]
 fn plugins_of_mitsuba_that_are_missing_are_not_called_unknown() {
     for (element, plugin) in [
-        ("bsdf", "principled"),
+        ("bsdf", "principledthin"),
         ("bsdf", "normalmap"),
         ("bsdf", "hair"),
         ("shape", "sdfgrid"),

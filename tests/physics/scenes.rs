@@ -87,8 +87,8 @@ const PLASTICS: &str = r#"
 
 /// A sphere and a tube that shine.
 const LAMPS: &str = r#"
-<shape type="sphere"><point name="center" value="-0.6, 0.3, 0.1"/><float name="radius" value="0.1"/><emitter type="area"><rgb name="radiance" value="4, 6, 8"/></emitter></shape>
-<shape type="cylinder"><point name="p0" value="0.5, -0.95, -0.5"/><point name="p1" value="0.6, -0.2, -0.6"/><float name="radius" value="0.05"/><emitter type="area"><rgb name="radiance" value="6, 3, 2"/></emitter></shape>"#;
+<shape type="sphere"><point name="center" value="-0.6, 0.3, 0.1"/><float name="radius" value="0.1"/><bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="4, 6, 8"/></emitter></shape>
+<shape type="cylinder"><point name="p0" value="0.5, -0.95, -0.5"/><point name="p1" value="0.6, -0.2, -0.6"/><float name="radius" value="0.05"/><bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="6, 3, 2"/></emitter></shape>"#;
 
 /// One that shines inwards. Grazing light leaves it by an edge so short that the reference of weights, which takes
 /// directions from positions, has no digits left; so it stands where other joins outweigh that.

@@ -76,7 +76,7 @@ fn wall(filter: &str, crop: Option<[u32; 4]>, passes: u64) -> Picture {
     <film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="36"/><rfilter type="{filter}"/></film></sensor>
   <shape type="rectangle"><transform name="to_world"><scale value="9"/></transform></shape>
   <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="180"/><translate z="6"/></transform>
-    <emitter type="area"><rgb name="radiance" value="3, 2, 1"/></emitter></shape>
+    <bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="3, 2, 1"/></emitter></shape>
 </scene>"#
     ));
     let mut options = Options { crop, ..Options::for_scene(&world, Estimator::Gather) };

@@ -74,6 +74,10 @@ def rough_plastic(distribution, alpha, int_ior, nonlinear):
     }
 
 
+def principled(**parameters):
+    return {"type": "principled"} | parameters
+
+
 def blend(weight, first, second):
     return {"type": "blendbsdf", "weight": weight, "a": first, "b": second}
 
@@ -118,6 +122,28 @@ MODELS = {
             {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0},
         ),
     },
+    "principled": {"type": "principled"},
+    "principled_metal": principled(
+        base_color=rgb(0.9, 0.6, 0.2), roughness=0.4, anisotropic=0.7, metallic=1.0
+    ),
+    "principled_glass": principled(base_color=rgb(0.9, 0.8, 0.3), roughness=0.6, spec_trans=1.0, eta=1.5),
+    "principled_cloth": principled(
+        base_color=bitmap(), roughness=0.9, spec_tint=0.8, sheen=1.0, sheen_tint=0.5, flatness=0.6, specular=0.3
+    ),
+    "principled_all": principled(
+        base_color=rgb(0.5, 0.3, 0.2),
+        roughness=checker(0.5, 0.7),
+        anisotropic=0.3,
+        metallic=0.3,
+        spec_trans=0.4,
+        spec_tint=0.5,
+        sheen=0.5,
+        sheen_tint=0.7,
+        flatness=0.2,
+        clearcoat=0.8,
+        clearcoat_gloss=0.4,
+        eta=1.4,
+    ),
 }
 
 

@@ -452,7 +452,7 @@ def mesh_of(thing, folder, place=None):
         if isinstance(radiance, dict):
             raise emitter.unknown("has a texture, which is not known to this peer")
         emitter.done()
-    bsdf = bsdf_of(bsdfs[0], folder) if bsdfs else {"type": "diffuse", "id": None, "reflectance": np.full(3, 0.5)}
+    bsdf = bsdf_of(bsdfs[0], folder) if bsdfs else {"type": "diffuse", "id": None, "reflectance": np.full(3, 0.0 if emitters else 0.5)}
     m = (np.eye(4) if place is None else place) @ thing.get("to_world", np.eye(4))
     flip, sphere = thing.get("flip_normals", False), None
     scale = np.linalg.norm(m[:3, 0])

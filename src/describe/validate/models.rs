@@ -72,6 +72,12 @@ impl Check<'_> {
                 self.unit(diffuse_reflectance, place, "diffuse_reflectance");
                 self.unit(specular_reflectance, place, "specular_reflectance");
             }
+            Principled { parameters: p } => {
+                self.positive(p.eta, place, "eta");
+                for (name, texture) in p.textures() {
+                    self.unit(texture, place, name);
+                }
+            }
             TwoSided { front, back } => {
                 if [front, back].into_iter().any(|id| transmits(&self.scene.bsdfs, *id)) {
                     self.problems
@@ -179,7 +185,12 @@ fn transmits(bsdfs: &[BsdfDescription], start: BsdfId) -> bool {
     let mut seen = vec![false; bsdfs.len()];
     while let Some(i) = open.pop() {
         let Some(bsdf) = bsdfs.get(i).filter(|_| !std::mem::replace(&mut seen[i], true)) else { continue };
-        if matches!(bsdf.model, Dielectric { .. } | ThinDielectric { .. } | RoughDielectric { .. } | Null | Mask { .. }) {
+        let through = match &bsdf.model {
+            Dielectric { .. } | ThinDielectric { .. } | RoughDielectric { .. } | Null | Mask { .. } => true,
+            Principled { parameters: p } => p.spec_trans != TextureDescription::grey(0.0),
+            _ => false,
+        };
+        if through {
             return true;
         }
         open.extend(bsdf.model.children().into_iter().flatten().map(|id| id.0 as usize));

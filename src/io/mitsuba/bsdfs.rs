@@ -34,6 +34,24 @@ const ROUGHNESS: &[Property] = &[
     free("alpha_u", Kind::Texture, "`alpha`", "Roughness along u; together with `alpha_v`"),
     free("alpha_v", Kind::Texture, "`alpha`", "Roughness along v; together with `alpha_u`"),
 ];
+const PRINCIPLED: &[Property] = &[
+    optional("base_color", Kind::Texture, "0.5", "Colour of the diffuse part, of metal, and twice that of glass"),
+    optional("roughness", Kind::Texture, "0.5", "Square root of the facets' roughness, of which 0.001 is the least"),
+    optional("anisotropic", Kind::Texture, "0", "How much rougher it is along u than along v"),
+    optional("metallic", Kind::Texture, "0", "Share that is metal"),
+    optional("spec_trans", Kind::Texture, "0", "Share of the rest that is glass instead of opaque"),
+    free("eta", Kind::Float, "by `specular`", "Index of refraction inside over that outside"),
+    free("specular", Kind::Float, "0.5", "The same by what is reflected along the normal, in twelfths: 0.5 is 4 %"),
+    optional("spec_tint", Kind::Texture, "0", "How far the reflection has the colour"),
+    optional("sheen", Kind::Texture, "0", "Amount of a glow at grazing angles, as of cloth"),
+    optional("sheen_tint", Kind::Texture, "0", "How far it has the colour"),
+    optional("flatness", Kind::Texture, "0", "How far the diffuse part looks as if scattered below the surface"),
+    optional("clearcoat", Kind::Texture, "0", "Amount of a second, faint reflection"),
+    optional("clearcoat_gloss", Kind::Texture, "0", "How polished that is"),
+    harmless("main_specular_sampling_rate", Kind::Float, "Lobes are chosen by what they reflect"),
+    harmless("clearcoat_sampling_rate", Kind::Float, "Lobes are chosen by what they reflect"),
+    harmless("diffuse_reflectance_sampling_rate", Kind::Float, "Lobes are chosen by what they reflect"),
+];
 
 /// Local models.
 pub const BSDFS: &[Plugin] = &[
@@ -124,6 +142,19 @@ pub const BSDFS: &[Plugin] = &[
     <float name="alpha" value="0.15"/>
     <rgb name="diffuse_reflectance" value="0.1, 0.28, 0.55"/>
     <boolean name="nonlinear" value="true"/>
+</bsdf>"#,
+    },
+    Plugin {
+        tag: Tag::Bsdf,
+        name: "principled",
+        doc: "Plastic, cloth, metal and frosted glass by one set of numbers, all in [0, 1]; what modellers export.",
+        properties: &[PRINCIPLED],
+        example: r#"<bsdf type="principled" id="lacquer">
+    <rgb name="base_color" value="0.6, 0.05, 0.03"/>
+    <float name="roughness" value="0.4"/>
+    <float name="specular" value="0.6"/>
+    <float name="clearcoat" value="1"/>
+    <float name="clearcoat_gloss" value="0.9"/>
 </bsdf>"#,
     },
     Plugin {
@@ -251,6 +282,7 @@ fn model(b: &mut Builder, given: &Given) -> Option<BsdfModel> {
             diffuse_reflectance: b.texture(g, "diffuse_reflectance"),
             specular_reflectance: b.texture(g, "specular_reflectance"),
         },
+        "principled" => BsdfModel::Principled { parameters: Box::new(principled(b, g)) },
         "null" => BsdfModel::Null,
         "twosided" => {
             let inner = nested(b, g);
@@ -309,6 +341,41 @@ fn roughness(b: &mut Builder, given: &Given) -> (TextureDescription, TextureDesc
             (alpha.clone(), alpha)
         }
     }
+}
+
+fn principled(b: &mut Builder, g: &Given) -> PrincipledDescription {
+    PrincipledDescription {
+        base_color: b.texture(g, "base_color"),
+        roughness: b.texture(g, "roughness"),
+        anisotropic: b.texture(g, "anisotropic"),
+        metallic: b.texture(g, "metallic"),
+        spec_trans: b.texture(g, "spec_trans"),
+        spec_tint: b.texture(g, "spec_tint"),
+        sheen: b.texture(g, "sheen"),
+        sheen_tint: b.texture(g, "sheen_tint"),
+        flatness: b.texture(g, "flatness"),
+        clearcoat: b.texture(g, "clearcoat"),
+        clearcoat_gloss: b.texture(g, "clearcoat_gloss"),
+        eta: principled_eta(b, g),
+    }
+}
+
+/// By `eta`, or by `specular`.
+fn principled_eta(b: &mut Builder, given: &Given) -> f32 {
+    let (eta, specular) = (b.maybe_float(given, "eta"), b.maybe_float(given, "specular"));
+    if given.has("eta") && given.has("specular") {
+        let what = format!("{} has both `eta` and `specular`, which say the same", given.label());
+        b.problems.error(given.place_of("specular"), what);
+    }
+    let specular = match specular {
+        Some(v) if !(0.0..12.5).contains(&v) => {
+            b.problems
+                .error(given.place_of("specular"), format!("`specular` is {v}, but must lie in [0, 12.5), usually in [0, 1]"));
+            0.5
+        }
+        v => v.unwrap_or(0.5),
+    };
+    eta.unwrap_or_else(|| PrincipledDescription::eta(specular))
 }
 
 /// `(perfect, eta, k)` by name or by value.

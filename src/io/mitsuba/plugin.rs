@@ -151,7 +151,6 @@ const NOT_YET: &[(Tag, &[&str])] = &[
         &[
             "bumpmap",
             "normalmap",
-            "principled",
             "principledthin",
             "hair",
             "measured",

@@ -10,7 +10,7 @@ use glam::Vec3;
 const COMMON: &[Property] = &[
     free("to_world", Kind::Transform, "identity", "Object to world"),
     optional("flip_normals", Kind::Boolean, "false", "Turn the normals round"),
-    free("bsdf", Kind::Objects(Tag::Bsdf, 1), "`diffuse`", "The local model"),
+    free("bsdf", Kind::Objects(Tag::Bsdf, 1), "`diffuse`, black with an emitter", "The local model"),
     free("emitter", Kind::Objects(Tag::Emitter, 1), "none", "An `area` emitter"),
     harmless("silhouette_sampling_weight", Kind::Float, "Differentiable rendering only"),
 ];

@@ -10,6 +10,7 @@
 
 pub mod beckmann;
 pub mod ggx;
+pub mod gtr1;
 
 use crate::describe::MicrofacetDescription;
 use glam::{Vec2, Vec3};

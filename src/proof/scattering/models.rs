@@ -2,7 +2,7 @@
 
 use crate::describe::{
     BitmapFilter, BitmapWrap, BsdfDescription, BsdfId, BsdfModel, Image, ImageDescription, ImageId, MicrofacetDescription, Place,
-    TextureDescription,
+    PrincipledDescription, TextureDescription,
 };
 use crate::local::{Closure, MaterialId, Materials};
 use glam::{Mat4, Vec2, Vec3};
@@ -23,6 +23,15 @@ pub struct Case {
 }
 
 impl Case {
+    /// The last of these models.
+    ///
+    /// # Panics
+    /// If they are not right.
+    pub fn of(name: &'static str, lossless: bool, eta: f32, models: &[BsdfDescription]) -> Self {
+        let materials = Materials::build(models, &images()).unwrap_or_else(|p| panic!("{name}: {p:?}"));
+        Self { name, lossless, eta, materials }
+    }
+
     /// The model for events that come along `w_back`.
     pub fn at(&self, w_back: Vec3) -> Closure<'_> {
         self.materials.resolve(self.id(), UV, w_back.z > 0.0)
@@ -35,7 +44,7 @@ impl Case {
 
     /// Which of them it is.
     pub fn id(&self) -> MaterialId {
-        MaterialId(self.materials.len() as u32 - 2)
+        MaterialId(self.materials.len() as u32 - 3)
     }
 }
 
@@ -137,6 +146,10 @@ fn rough_plastic(distribution: MicrofacetDescription, alpha: f32, int_ior: f32, 
     }
 }
 
+fn principled(parameters: PrincipledDescription) -> BsdfModel {
+    BsdfModel::Principled { parameters: Box::new(parameters) }
+}
+
 /// All models; the last description of each is the one under test.
 pub fn all_models() -> Vec<Case> {
     use BsdfModel::{Blend, Mask, Null, ThinDielectric, TwoSided};
@@ -186,6 +199,65 @@ pub fn all_models() -> Vec<Case> {
         ("roughplastic_beckmann_01", lossy, 1.0, vec![rough_plastic(Beckmann, 0.1, 1.49, false)]),
         ("roughplastic_ggx_03", lossy, 1.0, vec![rough_plastic(Ggx, 0.3, 1.9, true)]),
         ("roughplastic_beckmann_1", lossy, 1.0, vec![rough_plastic(Beckmann, 1.0, 1.49, true)]),
+        ("principled", lossy, 1.0, vec![principled(PrincipledDescription::default())]),
+        (
+            "principled_metal",
+            lossy,
+            1.0,
+            vec![principled(PrincipledDescription {
+                base_color: rgb(0.9, 0.6, 0.2),
+                roughness: grey(0.4),
+                anisotropic: grey(0.7),
+                metallic: grey(1.0),
+                ..Default::default()
+            })],
+        ),
+        (
+            "principled_glass",
+            lossy,
+            1.5,
+            vec![principled(PrincipledDescription {
+                base_color: rgb(0.9, 0.8, 0.3),
+                roughness: grey(0.6),
+                spec_trans: grey(1.0),
+                eta: 1.5,
+                ..Default::default()
+            })],
+        ),
+        (
+            "principled_cloth",
+            lossy,
+            1.0,
+            vec![principled(PrincipledDescription {
+                base_color: bitmap(),
+                roughness: grey(0.9),
+                spec_tint: grey(0.8),
+                sheen: grey(1.0),
+                sheen_tint: grey(0.5),
+                flatness: grey(0.6),
+                eta: PrincipledDescription::eta(0.3),
+                ..Default::default()
+            })],
+        ),
+        (
+            "principled_all",
+            lossy,
+            1.4,
+            vec![principled(PrincipledDescription {
+                base_color: rgb(0.5, 0.3, 0.2),
+                roughness: checkerboard(0.5, 0.7),
+                anisotropic: grey(0.3),
+                metallic: grey(0.3),
+                spec_trans: grey(0.4),
+                spec_tint: grey(0.5),
+                sheen: grey(0.5),
+                sheen_tint: grey(0.7),
+                flatness: grey(0.2),
+                clearcoat: grey(0.8),
+                clearcoat_gloss: grey(0.4),
+                eta: 1.4,
+            })],
+        ),
         ("twosided", lossy, 1.0, vec![diffuse(grey(0.5)), TwoSided { front: id(0), back: id(0) }]),
         (
             "twosided_different",
@@ -230,8 +302,7 @@ pub fn all_models() -> Vec<Case> {
         .into_iter()
         .map(|(name, lossless, eta, models)| {
             let models: Vec<_> = models.into_iter().map(described).collect();
-            let materials = Materials::build(&models, &images()).unwrap_or_else(|p| panic!("{name}: {p:?}"));
-            Case { name, lossless, eta, materials }
+            Case::of(name, lossless, eta, &models)
         })
         .collect()
 }
