@@ -35,13 +35,13 @@ const ROUGHNESS: &[Property] = &[
     free("alpha_v", Kind::Texture, "`alpha`", "Roughness along v; together with `alpha_u`"),
 ];
 const PRINCIPLED: &[Property] = &[
-    optional("base_color", Kind::Texture, "0.5", "Colour of the diffuse part, of metal, and twice that of glass"),
+    optional("base_color", Kind::Texture, "0.5", "Colour of the diffuse part, of metal, and of what went in and out of glass"),
     optional("roughness", Kind::Texture, "0.5", "Square root of the facets' roughness, of which 0.001 is the least"),
     optional("anisotropic", Kind::Texture, "0", "How much rougher it is along u than along v"),
     optional("metallic", Kind::Texture, "0", "Share that is metal"),
     optional("spec_trans", Kind::Texture, "0", "Share of the rest that is glass instead of opaque"),
     free("eta", Kind::Float, "by `specular`", "Index of refraction inside over that outside"),
-    free("specular", Kind::Float, "0.5", "The same by what is reflected along the normal, in twelfths: 0.5 is 4 %"),
+    free("specular", Kind::Float, "0.5", "The same by what is reflected along the normal, 0.08 of this: 0.5 is 4 %"),
     optional("spec_tint", Kind::Texture, "0", "How far the reflection has the colour"),
     optional("sheen", Kind::Texture, "0", "Amount of a glow at grazing angles, as of cloth"),
     optional("sheen_tint", Kind::Texture, "0", "How far it has the colour"),
