@@ -138,6 +138,10 @@ fn values_given_twice_or_missing_are_errors() {
     expect(&bsdf("blendbsdf", r#"<float name="weight" value=".5"/><bsdf type="diffuse"/>"#), &["needs two nested models"]);
     expect(&bsdf("mask", "<bsdf type=\"null\"/><bsdf type=\"null\"/>"), &["takes at most 1 <bsdf>"]);
     expect(&bsdf("roughconductor", r#"<float name="alpha_u" value=".1"/>"#), &["needs both `alpha_u` and `alpha_v`"]);
+    expect(
+        &bsdf("principled", r#"<float name="eta" value="1.5"/><float name="specular" value="0.5"/>"#),
+        &["has both `eta` and `specular`"],
+    );
     expect(&bsdf("conductor", r#"<float name="eta" value="1"/>"#), &["`k` is missing"]);
     expect(
         &camera(r#"<float name="fov" value="30"/><string name="focal_length" value="50mm"/>"#),
@@ -183,6 +187,10 @@ fn numbers_out_of_range_are_found_at_load() {
     expect(&bsdf("dielectric", r#"<float name="ext_ior" value="0"/>"#), &["`ext_ior` is 0.0; it must be greater than 0"]);
     expect(&bsdf("roughconductor", r#"<float name="alpha" value="0"/>"#), &["`alpha_u` is 0.0; it must be greater than 0"]);
     expect(&bsdf("twosided", "<bsdf type=\"dielectric\"/>"), &["contains one that transmits light"]);
+    let clear = bsdf("principled", r#"<float name="spec_trans" value="0.1"/>"#);
+    expect(&bsdf("twosided", &clear), &["contains one that transmits light"]);
+    expect(&bsdf("principled", r#"<float name="specular" value="13"/>"#), &["`specular` is 13, but must lie in [0, 12.5)"]);
+    expect(&bsdf("principled", r#"<float name="metallic" value="1.5"/>"#), &["`metallic` is 1.5; it must lie in [0, 1]"]);
     for fov in ["0", "180", "-3"] {
         expect(&camera(&format!("<float name=\"fov\" value=\"{fov}\"/>")), &["it must lie between 0 and 180 degrees"]);
     }

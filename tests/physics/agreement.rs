@@ -146,6 +146,7 @@ scenes_agree! {
     glass_and_mirror: "glass and mirror",
     rough_glass: "rough glass and metal",
     plastics: "plastics, mask and blend",
+    principled: "principled",
     shading_normals: "shading normals",
     point_light: "point light",
     spot_light: "spot light",

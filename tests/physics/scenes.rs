@@ -85,6 +85,16 @@ const PLASTICS: &str = r#"
 <shape type="cube"><transform name="to_world"><scale value="0.2"/><translate x="0" y="-0.8" z="0.5"/></transform>
   <bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="diffuse"/><bsdf type="conductor"><string name="material" value="none"/></bsdf></bsdf></shape>"#;
 
+/// A lacquer, frosted glass with a diffuse part, and a gilded block, all by one model.
+const PRINCIPLED: &str = r#"
+<shape type="sphere"><point name="center" value="0.4, -0.55, 0.2"/><float name="radius" value="0.42"/>
+  <bsdf type="principled"><rgb name="base_color" value="0.9, 0.8, 0.6"/><float name="roughness" value="0.5"/><float name="spec_trans" value="0.7"/><float name="eta" value="1.5"/>
+  <float name="spec_tint" value="0.4"/><float name="flatness" value="0.5"/></bsdf></shape>
+<shape type="sphere"><point name="center" value="-0.45, -0.5, -0.2"/><float name="radius" value="0.45"/>
+  <bsdf type="principled"><rgb name="base_color" value="0.5, 0.1, 0.1"/><float name="roughness" value="0.6"/><float name="clearcoat" value="1"/><float name="sheen" value="0.8"/></bsdf></shape>
+<shape type="cube"><transform name="to_world"><scale value="0.2"/><rotate y="1" angle="30"/><translate x="0" y="-0.8" z="0.6"/></transform>
+  <bsdf type="principled"><rgb name="base_color" value="0.9, 0.7, 0.3"/><float name="metallic" value="0.9"/><float name="roughness" value="0.5"/><float name="anisotropic" value="0.6"/></bsdf></shape>"#;
+
 /// A sphere and a tube that shine.
 const LAMPS: &str = r#"
 <shape type="sphere"><point name="center" value="-0.6, 0.3, 0.1"/><float name="radius" value="0.1"/><bsdf type="diffuse"/><emitter type="area"><rgb name="radiance" value="4, 6, 8"/></emitter></shape>
@@ -188,6 +198,7 @@ pub fn all(dir: &Path) -> Vec<TestScene> {
         scene("nearly specular", CAMERA, FILM, &[CEILING, AREA, NEARLY_SPECULAR]),
         scene("frosted", CAMERA, FILM, &[CEILING, AREA, FROSTED]),
         scene("plastics, mask and blend", CAMERA, FILM, &[CEILING, AREA, PLASTICS]),
+        scene("principled", CAMERA, FILM, &[CEILING, AREA, PRINCIPLED]),
         scene("shading normals", CAMERA, FILM, &[CEILING, AREA, &coarse]),
         scene("point light", CAMERA, FILM, &[CEILING, point, GLASS_AND_MIRROR]),
         scene("spot light", CAMERA, FILM, &[CEILING, spot, BLOCK]),
