@@ -246,11 +246,17 @@ impl Principled {
         self.base.sqrt() * (self.clear * (1.0 - dielectric))
     }
 
-    /// Probability that a facet mirrors, from the side of the normal or from inside, and what it mirrors and refracts from there.
+    /// Share that a facet mirrors, from the side of the normal or from inside.
     #[inline]
-    fn mirrors(&self, seen: Seen, front: bool) -> (f32, f32) {
+    fn mirrored(&self, seen: Seen, front: bool) -> Spectrum {
+        if front { self.reflected(seen) } else { Spectrum::grey(self.clear * seen.dielectric) }
+    }
+
+    /// Probability that a facet mirrors where it mirrors this share, and what it mirrors and refracts.
+    #[inline]
+    fn mirrors(&self, seen: Seen, mirrored: Spectrum) -> (f32, f32) {
         let through = if self.clear > 0.0 { self.refracted(seen.dielectric).mean() } else { 0.0 };
-        let mirrored = if front { self.reflected(seen).mean() } else { self.clear * seen.dielectric };
+        let mirrored = mirrored.mean();
         let both = mirrored + through;
         (if through > 0.0 { mirrored / both } else { 1.0 }, both)
     }
@@ -262,7 +268,8 @@ impl Principled {
             return Shares { facets: 1.0, coat: 0.0, diffuse: 0.0 };
         }
         let b = boundary(cos, self.eta, self.inv_eta);
-        let (_, facets) = self.mirrors(Seen::of(&b, cos), true);
+        let seen = Seen::of(&b, cos);
+        let (_, facets) = self.mirrors(seen, self.reflected(seen));
         let diffuse = if self.opaque > 0.0 { self.opaque * self.base.mean() + SHEEN_ALBEDO * self.sheen } else { 0.0 };
         let (facets, coat) = (facets.max(LEAST_FACETS), COAT_ALBEDO * self.coat);
         let norm = 1.0 / (facets + coat + diffuse);
@@ -288,17 +295,17 @@ impl Principled {
         plain + Spectrum::grey(1.0).lerp(self.tint(), self.sheen_tint) * (self.sheen * rise(c_d))
     }
 
-    /// Mirrored on one side of the surface.
-    fn mirrored(&self, facet: &Facet, w_back: Vec3, w_next: Vec3) -> Evaluation {
+    /// Back to the side it came from.
+    fn back(&self, facet: &Facet, w_back: Vec3, w_next: Vec3) -> Evaluation {
         let seen = Seen::of(&facet.b, facet.cos_back);
         let front = w_back.z > 0.0;
-        let (mirrors, _) = self.mirrors(seen, front);
-        let quarter_d = 0.25 * facet.d;
+        let mirrored = self.mirrored(seen, front);
+        let (mirrors, _) = self.mirrors(seen, mirrored);
+        let quarter_d = facet.density();
         let (back, next) = (self.facets.masking(w_back), self.facets.masking(w_next));
         let (share, share_rev) = (self.shares(w_back.z), self.shares(w_next.z));
-        let masked = quarter_d * back.g() * next.g();
         let mut e = Evaluation {
-            f: if front { self.reflected(seen) * masked } else { Spectrum::grey(self.clear * seen.dielectric * masked) },
+            f: mirrored * (quarter_d * back.g() * next.g()),
             p_w: share.facets * mirrors * quarter_d * back.visible,
             p_w_rev: share_rev.facets * mirrors * quarter_d * next.visible,
         };
@@ -333,7 +340,7 @@ impl Principled {
         let (back, next) = (self.facets.masking(w_back), self.facets.masking(w_next));
         let eta2 = facet.b.eta * facet.b.eta;
         let n_o2 = if equation == Equation::Potential { eta2 } else { 1.0 };
-        let leaves = |w: Vec3, front| self.shares(w.z).facets * (1.0 - self.mirrors(seen, front).0);
+        let leaves = |w: Vec3, front| self.shares(w.z).facets * (1.0 - self.mirrors(seen, self.mirrored(seen, front)).0);
         Evaluation {
             f: self.refracted(seen.dielectric) * (d * back.g() * next.g() * n_o2),
             p_w: leaves(w_back, front) * d * back.visible * eta2,
@@ -344,7 +351,7 @@ impl Principled {
     #[inline]
     fn at(&self, equation: Equation, facet: &Facet, w_back: Vec3, w_next: Vec3) -> Evaluation {
         match facet.reflects {
-            true => self.mirrored(facet, w_back, w_next),
+            true => self.back(facet, w_back, w_next),
             false => self.through(equation, facet, w_back, w_next),
         }
     }
@@ -381,7 +388,10 @@ impl Lobe for Principled {
             facet(2.0 * w_back.dot(m) * m - w_back).filter(|(_, facet)| facet.reflects)?
         } else {
             let u_facet = (u_lobe - share.diffuse - share.coat) / share.facets;
-            Facet::sample(&self.facets, eta, w_back, u, |b, cos| u_facet < self.mirrors(Seen::of(b, cos), w_back.z > 0.0).0)?
+            Facet::sample(&self.facets, eta, w_back, u, |b, cos| {
+                let seen = Seen::of(b, cos);
+                u_facet < self.mirrors(seen, self.mirrored(seen, w_back.z > 0.0)).0
+            })?
         };
         let e = self.at(equation, &facet, w_back, w_next);
         if !(e.p_w > 0.0 && e.p_w < f32::INFINITY) {
